@@ -1,0 +1,116 @@
+//! What a node serves beside its communication area.
+
+/// Why an object can't be read or written: the SDO abort codes of CiA 301, 7.2.4.3.17.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Abort {
+    /// The toggle bit did not alternate.
+    ToggleBit = 0x0503_0000,
+    /// The other side fell silent.
+    Timeout = 0x0504_0000,
+    /// The command specifier is unknown.
+    Command = 0x0504_0001,
+    /// The block size is out of range.
+    BlockSize = 0x0504_0002,
+    /// The sequence number is out of range.
+    SequenceNumber = 0x0504_0003,
+    /// The CRC is wrong.
+    Crc = 0x0504_0004,
+    /// The transfer is larger than the memory for it.
+    OutOfMemory = 0x0504_0005,
+    /// The object can't be accessed this way.
+    UnsupportedAccess = 0x0601_0000,
+    /// The object can only be written.
+    WriteOnly = 0x0601_0001,
+    /// The object can only be read.
+    ReadOnly = 0x0601_0002,
+    /// There is no such object.
+    NoObject = 0x0602_0000,
+    /// The object can't be mapped to the PDO.
+    NotMappable = 0x0604_0041,
+    /// The mapped objects would not fit the PDO.
+    PdoLength = 0x0604_0042,
+    /// The parameter is incompatible.
+    Incompatible = 0x0604_0043,
+    /// The hardware failed.
+    Hardware = 0x0606_0000,
+    /// The length does not match the object's type.
+    Length = 0x0607_0010,
+    /// The data is longer than the object.
+    TooLong = 0x0607_0012,
+    /// The data is shorter than the object.
+    TooShort = 0x0607_0013,
+    /// There is no such subindex.
+    NoSubindex = 0x0609_0011,
+    /// The value is not allowed.
+    Value = 0x0609_0030,
+    /// The value is too high.
+    ValueTooHigh = 0x0609_0031,
+    /// The value is too low.
+    ValueTooLow = 0x0609_0032,
+    /// A reason that has no code of its own.
+    General = 0x0800_0000,
+    /// The data can't be stored or transferred.
+    Transfer = 0x0800_0020,
+    /// The device is under local control.
+    LocalControl = 0x0800_0021,
+    /// The device's state forbids it.
+    DeviceState = 0x0800_0022,
+    /// There is no data.
+    NoData = 0x0800_0024,
+}
+
+/// Who may do what with an object, seen from the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Read and never changed.
+    Constant,
+    /// Read.
+    ReadOnly,
+    /// Written.
+    WriteOnly,
+    /// Read and written.
+    ReadWrite,
+}
+
+/// What the node must know of an application's object before it touches it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its length in bytes; 0 where the length varies.
+    pub length: u8,
+    /// Who may read and write it.
+    pub access: Access,
+    /// Whether a TPDO may carry it.
+    pub tpdo: bool,
+    /// Whether an RPDO may carry it.
+    pub rpdo: bool,
+}
+
+/// The objects outside 0x1000–0x1FFF, and what happens around a PDO.
+pub trait Application {
+    /// Describes an object.
+    ///
+    /// # Errors
+    /// [`Abort::NoObject`] or [`Abort::NoSubindex`].
+    fn entry(&self, index: u16, subindex: u8) -> Result<Entry, Abort>;
+
+    /// Copies an object's bytes, little-endian, to the start of `out` and returns how many.
+    ///
+    /// # Errors
+    /// The abort code to answer with; [`Abort::OutOfMemory`] when `out` is too small.
+    fn read(&self, index: u16, subindex: u8, out: &mut [u8]) -> Result<usize, Abort>;
+
+    /// Writes an object from little-endian bytes.
+    ///
+    /// # Errors
+    /// The abort code to answer with; the object is then unchanged.
+    fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort>;
+
+    /// Hears that every object mapped to RPDO `number` (1–4) has just been written from a frame
+    /// with identifier `cob_id`.
+    fn rpdo_applied(&mut self, number: u8, cob_id: u16);
+
+    /// Hears that TPDO `number` (1–4) is about to be read and sent as `cob_id`, so that its
+    /// objects can be brought up to date.
+    fn tpdo_due(&mut self, number: u8, cob_id: u16);
+}

@@ -1,0 +1,21 @@
+//! The vertebra on the wire: identifiers, frames, object dictionary, fault catalogue.
+//!
+//! A number on the wire is written here and nowhere else. EDS, DBC and the tables of the
+//! documentation are generated from this crate.
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(clippy::float_arithmetic)]
+
+mod crc;
+mod frames;
+mod ids;
+mod states;
+
+pub use crc::{crc8, protection};
+pub use eel_canopen::{Frame, Id};
+pub use frames::{Counter, Effort, Flags, FrameError, Moment, PoseReport, Target};
+pub use ids::{
+    Cob, HEAD_HEARTBEAT_MS, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, SYNC_PERIOD_US, VERTEBRAE,
+    VERTEBRA_HEARTBEAT_MS,
+};
+pub use states::{LimitCode, Mode, State};

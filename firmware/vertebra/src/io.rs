@@ -1,0 +1,35 @@
+//! What a vertebra measures and what it does to its motors.
+
+use eel_units::{Angle, Current, Duty, Temperature, Voltage};
+
+/// Everything measured for one control tick; motors in the order 1, 2, 3.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample {
+    /// Quadrature counts of each motor since power-up, positive with the motor's angle; wraps.
+    pub encoder_counts: [i32; 3],
+    /// Angle of each crank by its absolute encoder; `None` where the reading is not valid.
+    pub absolute: [Option<Angle>; 3],
+    /// Current of each motor, mean over the tick, positive with positive torque.
+    pub current: [Current; 3],
+    /// Supply voltage of the bridges.
+    pub supply: Voltage,
+    /// Temperature of the board.
+    pub board_temperature: Temperature,
+    /// Housing temperature of each motor.
+    pub motor_temperature: [Temperature; 3],
+    /// Whether a bridge reports a fault.
+    pub bridge_fault: [bool; 3],
+    /// Whether the emergency stop line is asserted.
+    pub emergency_stop: bool,
+}
+
+/// What a bridge does until the next tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drive {
+    /// All switches open: the motor is free.
+    Off,
+    /// Low sides on: the motor is shorted and brakes itself.
+    Brake,
+    /// Applies this share of the supply voltage, positive with positive torque.
+    Duty(Duty),
+}
