@@ -11,7 +11,11 @@ const fn nibble_table() -> [u8; 16] {
         let mut crc = (index as u8) << 4;
         let mut bit = 0;
         while bit < 4 {
-            crc = if crc & 0x80 != 0 { (crc << 1) ^ 0x2F } else { crc << 1 };
+            crc = if crc & 0x80 != 0 {
+                (crc << 1) ^ 0x2F
+            } else {
+                crc << 1
+            };
             bit += 1;
         }
         table[index] = crc;

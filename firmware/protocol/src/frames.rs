@@ -25,12 +25,20 @@ impl Counter {
     /// Returns the counter of the following frame.
     #[must_use]
     pub const fn next(self) -> Self {
-        if self.0 >= 14 { Self(0) } else { Self(self.0 + 1) }
+        if self.0 >= 14 {
+            Self(0)
+        } else {
+            Self(self.0 + 1)
+        }
     }
 
     /// Returns how many steps lead from `earlier` to this counter, 0–14.
     pub const fn since(self, earlier: Self) -> u8 {
-        if self.0 >= earlier.0 { self.0 - earlier.0 } else { self.0 + 15 - earlier.0 }
+        if self.0 >= earlier.0 {
+            self.0 - earlier.0
+        } else {
+            self.0 + 15 - earlier.0
+        }
     }
 }
 
@@ -114,7 +122,16 @@ pub struct Effort {
 fn pack_protected(angles: [Angle; 3], code: u8, cob_id: u16) -> [u8; 8] {
     let [y, p, r] = angles.map(|angle| angle.to_tenth_milliradians().to_le_bytes());
     let body = [y[0], y[1], p[0], p[1], r[0], r[1], code];
-    [y[0], y[1], p[0], p[1], r[0], r[1], code, protection(&body, cob_id)]
+    [
+        y[0],
+        y[1],
+        p[0],
+        p[1],
+        r[0],
+        r[1],
+        code,
+        protection(&body, cob_id),
+    ]
 }
 
 /// Unpacks three angles, a code and a counter, and checks the protection.
@@ -148,7 +165,13 @@ impl Target {
     pub fn from_bytes(bytes: &[u8; 8], cob_id: u16) -> Result<Self, FrameError> {
         let ([yaw, pitch, roll], code, counter) = unpack_protected(bytes, cob_id)?;
         let mode = Mode::from_code(code).ok_or(FrameError::Value)?;
-        Ok(Self { yaw, pitch, roll, mode, counter })
+        Ok(Self {
+            yaw,
+            pitch,
+            roll,
+            mode,
+            counter,
+        })
     }
 
     /// Returns the frame that carries the target to `node`.
@@ -172,7 +195,13 @@ impl PoseReport {
     pub fn from_bytes(bytes: &[u8; 8], cob_id: u16) -> Result<Self, FrameError> {
         let ([yaw, pitch, roll], code, counter) = unpack_protected(bytes, cob_id)?;
         let state = State::from_code(code).ok_or(FrameError::Value)?;
-        Ok(Self { yaw, pitch, roll, state, counter })
+        Ok(Self {
+            yaw,
+            pitch,
+            roll,
+            state,
+            counter,
+        })
     }
 
     /// Unpacks a pose frame with its sender.
@@ -181,7 +210,9 @@ impl PoseReport {
     /// Any [`FrameError`].
     pub fn from_frame(frame: &Frame) -> Result<(NodeId, Self), FrameError> {
         let id = frame.cob_id().ok_or(FrameError::Identifier)?;
-        let Cob::Pose(node) = Cob::from_id(id) else { return Err(FrameError::Identifier) };
+        let Cob::Pose(node) = Cob::from_id(id) else {
+            return Err(FrameError::Identifier);
+        };
         let node = NodeId::new(node).ok_or(FrameError::Identifier)?;
         Ok((node, Self::from_bytes(&payload(frame)?, id)?))
     }
@@ -190,7 +221,9 @@ impl PoseReport {
 impl Moment {
     /// Packs the moment as RPDO2's eight bytes.
     pub fn to_bytes(&self) -> [u8; 8] {
-        let [x, y, z] = self.moment.map(|torque| torque.to_millinewton_metres().to_le_bytes());
+        let [x, y, z] = self
+            .moment
+            .map(|torque| torque.to_millinewton_metres().to_le_bytes());
         let s = self.stiffness.to_le_bytes();
         [x[0], x[1], y[0], y[1], z[0], z[1], s[0], s[1]]
     }
@@ -198,10 +231,12 @@ impl Moment {
     /// Unpacks RPDO2's eight bytes; every pattern is a moment.
     pub fn from_bytes(bytes: &[u8; 8]) -> Self {
         let [x0, x1, y0, y1, z0, z1, s0, s1] = *bytes;
-        let moment = [[x0, x1], [y0, y1], [z0, z1]].map(|pair| {
-            Torque::from_millinewton_metres(i32::from(i16::from_le_bytes(pair)))
-        });
-        Self { moment, stiffness: u16::from_le_bytes([s0, s1]) }
+        let moment = [[x0, x1], [y0, y1], [z0, z1]]
+            .map(|pair| Torque::from_millinewton_metres(i32::from(i16::from_le_bytes(pair))));
+        Self {
+            moment,
+            stiffness: u16::from_le_bytes([s0, s1]),
+        }
     }
 }
 
@@ -228,9 +263,20 @@ impl Flags {
 impl Effort {
     /// Packs the effort as TPDO2's eight bytes.
     pub fn to_bytes(&self) -> [u8; 8] {
-        let [a, b, c] = self.torque.map(|torque| torque.to_millinewton_metres().to_le_bytes());
+        let [a, b, c] = self
+            .torque
+            .map(|torque| torque.to_millinewton_metres().to_le_bytes());
         let [la, lb, lc] = self.limit.map(LimitCode::code);
-        [a[0], a[1], b[0], b[1], c[0], c[1], la | (lb << 4), lc | (self.flags.to_bits() << 4)]
+        [
+            a[0],
+            a[1],
+            b[0],
+            b[1],
+            c[0],
+            c[1],
+            la | (lb << 4),
+            lc | (self.flags.to_bits() << 4),
+        ]
     }
 
     /// Unpacks TPDO2's eight bytes.
@@ -239,11 +285,14 @@ impl Effort {
     /// [`FrameError::Value`] for a limit code that does not exist.
     pub fn from_bytes(bytes: &[u8; 8]) -> Result<Self, FrameError> {
         let [a0, a1, b0, b1, c0, c1, low, high] = *bytes;
-        let torque = [[a0, a1], [b0, b1], [c0, c1]].map(|pair| {
-            Torque::from_millinewton_metres(i32::from(i16::from_le_bytes(pair)))
-        });
+        let torque = [[a0, a1], [b0, b1], [c0, c1]]
+            .map(|pair| Torque::from_millinewton_metres(i32::from(i16::from_le_bytes(pair))));
         let code = |code| LimitCode::from_code(code).ok_or(FrameError::Value);
         let limit = [code(low & 0x0F)?, code(low >> 4)?, code(high & 0x0F)?];
-        Ok(Self { torque, limit, flags: Flags::from_bits(high >> 4) })
+        Ok(Self {
+            torque,
+            limit,
+            flags: Flags::from_bits(high >> 4),
+        })
     }
 }

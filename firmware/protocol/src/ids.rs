@@ -20,7 +20,11 @@ pub struct NodeId(u8);
 impl NodeId {
     /// Makes a vertebra's node id; `None` outside 1–10.
     pub const fn new(raw: u8) -> Option<Self> {
-        if raw >= 1 && raw <= VERTEBRAE { Some(Self(raw)) } else { None }
+        if raw >= 1 && raw <= VERTEBRAE {
+            Some(Self(raw))
+        } else {
+            None
+        }
     }
 
     /// Returns the number, 1–10.

@@ -6,16 +6,24 @@
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
 
+#[cfg(test)]
+extern crate std;
+
 mod crc;
+pub mod dictionary;
+pub mod emergency;
 mod frames;
 mod ids;
+pub mod pdo;
 mod states;
+mod status;
 
 pub use crc::{crc8, protection};
 pub use eel_canopen::{Frame, Id};
 pub use frames::{Counter, Effort, Flags, FrameError, Moment, PoseReport, Target};
 pub use ids::{
-    Cob, HEAD_HEARTBEAT_MS, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, SYNC_PERIOD_US, VERTEBRAE,
-    VERTEBRA_HEARTBEAT_MS,
+    Cob, HEAD_HEARTBEAT_MS, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, SYNC_PERIOD_US,
+    VERTEBRA_HEARTBEAT_MS, VERTEBRAE,
 };
 pub use states::{LimitCode, Mode, State};
+pub use status::{Condition, Status};

@@ -81,7 +81,10 @@ nibble! {
 impl State {
     /// Tells whether only a fault reset leads out of the state.
     pub const fn is_latched(self) -> bool {
-        matches!(self, Self::StopDamped | Self::StopBrake | Self::StopOff | Self::Fault)
+        matches!(
+            self,
+            Self::StopDamped | Self::StopBrake | Self::StopOff | Self::Fault
+        )
     }
 }
 

@@ -1,0 +1,123 @@
+//! What each PDO carries and when, as a vertebra leaves the factory.
+
+use crate::dictionary::{self, Pdo};
+use crate::ids::Cob;
+
+/// One mapped object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mapped {
+    /// The object's index.
+    pub index: u16,
+    /// The object's subindex.
+    pub subindex: u8,
+    /// The object's length in bits.
+    pub bits: u8,
+}
+
+/// The communication and the mapping of one PDO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PdoDefault {
+    /// COB-ID of node 0, to which the node id is added.
+    pub cob_id_base: u16,
+    /// Transmission type of CiA 301: 1–240 is every so many SYNCs.
+    pub transmission: u8,
+    /// Whether the PDO is on at power-up.
+    pub enabled: bool,
+    /// What it carries, from byte 0.
+    pub mapping: &'static [Mapped],
+}
+
+/// Makes a mapping from `(index, subindex)` pairs; the length comes from the dictionary.
+///
+/// # Panics
+/// Only while compiling: where an object is not in the dictionary, or not made for `direction`.
+const fn mapped<const N: usize>(direction: Pdo, pairs: [(u16, u8); N]) -> [Mapped; N] {
+    let mut mapping = [Mapped {
+        index: 0,
+        subindex: 0,
+        bits: 0,
+    }; N];
+    let mut total = 0;
+    let mut place = 0;
+    while place < N {
+        let (index, subindex) = pairs[place];
+        let Some(sub) = dictionary::lookup(index, subindex) else {
+            panic!("no such object")
+        };
+        assert!(matches!(
+            (sub.pdo, direction),
+            (Pdo::Receive, Pdo::Receive) | (Pdo::Transmit, Pdo::Transmit)
+        ));
+        let bits = sub.data_type.bits();
+        total += bits as usize;
+        mapping[place] = Mapped {
+            index,
+            subindex,
+            bits,
+        };
+        place += 1;
+    }
+    assert!(total == 64, "a frame of this bus is full");
+    mapping
+}
+
+const TARGET: &[Mapped] = &mapped(
+    Pdo::Receive,
+    [
+        (0x2000, 1),
+        (0x2000, 2),
+        (0x2000, 3),
+        (0x2000, 4),
+        (0x2000, 5),
+    ],
+);
+const MOMENT: &[Mapped] = &mapped(
+    Pdo::Receive,
+    [(0x2001, 1), (0x2001, 2), (0x2001, 3), (0x2001, 4)],
+);
+const POSE: &[Mapped] = &mapped(
+    Pdo::Transmit,
+    [
+        (0x2010, 1),
+        (0x2010, 2),
+        (0x2010, 3),
+        (0x2010, 4),
+        (0x2010, 5),
+    ],
+);
+const EFFORT: &[Mapped] = &mapped(
+    Pdo::Transmit,
+    [(0x2011, 1), (0x2011, 2), (0x2011, 3), (0x2011, 4)],
+);
+
+/// The PDOs that a vertebra receives: RPDO1 target, latched at each SYNC, and RPDO2 moment, off.
+pub const RPDOS: &[PdoDefault] = &[
+    PdoDefault {
+        cob_id_base: Cob::Target(0).id(),
+        transmission: 1,
+        enabled: true,
+        mapping: TARGET,
+    },
+    PdoDefault {
+        cob_id_base: Cob::Moment(0).id(),
+        transmission: 1,
+        enabled: false,
+        mapping: MOMENT,
+    },
+];
+
+/// The PDOs that a vertebra sends: TPDO1 pose at each SYNC, TPDO2 effort at every second.
+pub const TPDOS: &[PdoDefault] = &[
+    PdoDefault {
+        cob_id_base: Cob::Pose(0).id(),
+        transmission: 1,
+        enabled: true,
+        mapping: POSE,
+    },
+    PdoDefault {
+        cob_id_base: Cob::Effort(0).id(),
+        transmission: 2,
+        enabled: true,
+        mapping: EFFORT,
+    },
+];
