@@ -1,2 +1,92 @@
-//! In the making.
-fn main() {}
+//! Builds, tests and generates everything: `cargo xtask --help`.
+//!
+//! Knows the tools around the project (cross toolchain, QEMU, User-mode Linux, Python) and nothing
+//! of its crates but their names.
+
+mod cross;
+mod firmware;
+mod generated;
+mod image;
+mod panics;
+mod process;
+mod setup;
+mod suite;
+mod vcan;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::firmware::Board;
+
+/// Builds, tests and generates everything in Anguilla.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Runs everything that the project can test, and prints what each step took.
+    Test {
+        /// Leaves out what needs a tool beyond cargo: firmware, QEMU, vcan and Python.
+        #[arg(long)]
+        fast: bool,
+        /// Stops at the first step that fails.
+        #[arg(long)]
+        stop: bool,
+    },
+    /// Builds flashable images into target/firmware and holds them to their ceilings.
+    Firmware {
+        /// The board; all of them when not given.
+        board: Option<Board>,
+    },
+    /// Writes the image to a board with probe-rs.
+    Flash {
+        /// The board.
+        board: Board,
+    },
+    /// Writes EDS, DBC and the object table to docs/generated.
+    Gen {
+        /// Changes nothing, and fails when a file is stale.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Runs a command beside a real vcan0 and ends with its exit status.
+    Vcan {
+        /// The command and its arguments.
+        #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
+        command: Vec<String>,
+    },
+    /// Installs what the tests need, or names what is missing and how to get it.
+    Setup,
+    /// Prints flash and RAM use of the images that were built last.
+    Size,
+    /// Fails when a panicking symbol is reachable from the logic crates on the target.
+    Panics,
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().task {
+        Task::Test { fast, stop } => suite::run_all(fast, stop),
+        Task::Firmware { board } => firmware::build(board),
+        Task::Flash { board } => firmware::flash(board),
+        Task::Gen { check } => generated::run_generator(check),
+        Task::Vcan { command } => match vcan::run(&command, &[]) {
+            Ok(status) => return ExitCode::from(status),
+            Err(error) => Err(error),
+        },
+        Task::Setup => setup::prepare(),
+        Task::Size => firmware::print_sizes(),
+        Task::Panics => panics::check(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

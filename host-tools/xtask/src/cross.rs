@@ -1,0 +1,145 @@
+//! A toolchain for the Cortex-M4F, wherever one can be had.
+//!
+//! The first that holds: the target is installed; Debian's own compiler with its library's source;
+//! rustup can fetch the target.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use crate::process::{self, clean_root, command, output, target_dir};
+use crate::setup;
+
+/// The target of every image: Cortex-M4 with single-precision floating point.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+const DEBIAN_CARGO: &str = "/usr/bin/cargo";
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+const DEBIAN_LIBRARY: &str = "/usr/lib/rustlib/src/rust/library/core/Cargo.toml";
+
+/// Where the compiler comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Toolchain {
+    /// The toolchain that runs this program has the target.
+    Installed,
+    /// Debian's compiler, which builds its `core` from source.
+    Debian,
+}
+
+/// Starts a cross `cargo build` of one package with the profile that is flashed.
+///
+/// # Errors
+/// When there is no toolchain and none can be had.
+pub fn build_command() -> Result<Command> {
+    let mut build = match choose()? {
+        Toolchain::Installed => {
+            let mut build = process::cargo();
+            build.arg("build");
+            build
+        }
+        Toolchain::Debian => {
+            let mut build = command(DEBIAN_CARGO);
+            build.args([
+                "build",
+                "-Zbuild-std=core",
+                "--config",
+                "build.rustc-wrapper=''",
+            ]);
+            build.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
+            build.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker()?);
+            build
+        }
+    };
+    build.args(["--profile", "firmware", "--target", TARGET]);
+    // Of their own, or host and cross builds would make each other stale.
+    build.arg("--target-dir").arg(cross_dir());
+    build.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", rust_flags());
+    for variable in [
+        "RUSTFLAGS",
+        "CARGO_ENCODED_RUSTFLAGS",
+        "CARGO_BUILD_TARGET",
+        "CARGO",
+    ] {
+        build.env_remove(variable);
+    }
+    Ok(build)
+}
+
+/// Returns the target folder of cross builds.
+pub fn cross_dir() -> PathBuf {
+    target_dir().join("cross")
+}
+
+/// Returns where the linked image of a binary is.
+pub fn built(binary: &str) -> PathBuf {
+    cross_dir().join(TARGET).join("firmware").join(binary)
+}
+
+/// Chooses the toolchain, and installs what it takes where that is possible.
+fn choose() -> Result<Toolchain> {
+    if host_sysroot()?.join("lib/rustlib").join(TARGET).is_dir() {
+        return Ok(Toolchain::Installed);
+    }
+    if has_debian_toolchain() {
+        return Ok(Toolchain::Debian);
+    }
+    if setup::can_use_apt() {
+        setup::install_packages(&["rustc-web", "cargo-web", "rust-web-src"])?;
+        if has_debian_toolchain() {
+            return Ok(Toolchain::Debian);
+        }
+    }
+    println!("no compiler for {TARGET}: running `rustup target add {TARGET}`");
+    process::run(command("rustup").args(["target", "add", TARGET]))
+        .with_context(|| format!("the images need the target {TARGET}"))?;
+    Ok(Toolchain::Installed)
+}
+
+/// Tells whether Debian's compiler is there with its library's source, and new enough.
+fn has_debian_toolchain() -> bool {
+    let files = [DEBIAN_CARGO, DEBIAN_RUSTC, DEBIAN_LIBRARY];
+    if !files.iter().all(|path| Path::new(path).is_file()) {
+        return false;
+    }
+    let version = output(command(DEBIAN_RUSTC).arg("--version")).unwrap_or_default();
+    let mut numbers = version
+        .split([' ', '.'])
+        .skip(1)
+        .filter_map(|word| word.parse::<u32>().ok());
+    (numbers.next(), numbers.next()) >= (Some(1), Some(95))
+}
+
+/// Returns the folder of the toolchain that runs this program.
+fn host_sysroot() -> Result<PathBuf> {
+    let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    Ok(output(command(rustc).args(["--print", "sysroot"]))?
+        .trim()
+        .into())
+}
+
+/// Finds the linker that rustup ships with every toolchain, or another LLVM linker.
+fn linker() -> Result<PathBuf> {
+    let folder = host_sysroot()?.join("lib/rustlib");
+    let hosts = fs::read_dir(&folder).with_context(|| format!("no {}", folder.display()))?;
+    let shipped = hosts
+        .filter_map(Result::ok)
+        .map(|host| host.path().join("bin/rust-lld"))
+        .find(|candidate| candidate.is_file());
+    match shipped.or_else(|| process::find("ld.lld")) {
+        Some(path) => Ok(path),
+        None => bail!("neither rust-lld nor ld.lld found: install rustup's stable toolchain"),
+    }
+}
+
+/// Returns compiler flags that take the build's folders out of the image.
+fn rust_flags() -> String {
+    let home = env::var("HOME").unwrap_or_else(|_| "/root".into());
+    let cargo = env::var("CARGO_HOME").unwrap_or_else(|_| format!("{home}/.cargo"));
+    format!(
+        "--remap-path-prefix={}=anguilla --remap-path-prefix={cargo}=cargo",
+        clean_root().display()
+    )
+}

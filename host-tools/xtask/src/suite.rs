@@ -1,0 +1,175 @@
+//! Everything that the project can test, step by step.
+
+use std::env;
+use std::ffi::OsStr;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::process::{cargo, clean_root, output, run};
+use crate::{firmware, generated, panics, setup, vcan};
+
+/// One step: its name, and whether it needs a tool beyond cargo.
+struct Step {
+    name: &'static str,
+    needs_tools: bool,
+    run: fn() -> Result<()>,
+}
+
+const STEPS: [Step; 9] = [
+    Step {
+        name: "tools",
+        needs_tools: true,
+        run: setup::prepare,
+    },
+    Step {
+        name: "format",
+        needs_tools: false,
+        run: check_format,
+    },
+    Step {
+        name: "lints",
+        needs_tools: false,
+        run: check_lints,
+    },
+    Step {
+        name: "firmware images",
+        needs_tools: true,
+        run: || firmware::build(None),
+    },
+    Step {
+        name: "no panic in logic",
+        needs_tools: true,
+        run: panics::check,
+    },
+    Step {
+        name: "tests",
+        needs_tools: false,
+        run: run_tests,
+    },
+    Step {
+        name: "tests on vcan0",
+        needs_tools: true,
+        run: run_vcan_tests,
+    },
+    Step {
+        name: "generated files",
+        needs_tools: false,
+        run: || generated::run_generator(true),
+    },
+    Step {
+        name: "the main job",
+        needs_tools: false,
+        run: run_main_job,
+    },
+];
+
+/// Runs every step and prints what each took.
+///
+/// # Errors
+/// When a step failed.
+pub fn run_all(fast: bool, stop: bool) -> Result<()> {
+    let mut results: Vec<(&str, Result<()>, Duration)> = Vec::new();
+    for step in STEPS.iter().filter(|step| !(fast && step.needs_tools)) {
+        println!("\n=== {} ===", step.name);
+        let start = Instant::now();
+        let result = (step.run)();
+        if let Err(error) = &result {
+            println!("failed: {error:#}");
+        }
+        let failed = result.is_err();
+        results.push((step.name, result, start.elapsed()));
+        if failed && stop {
+            break;
+        }
+    }
+    println!("\n{:<20} {:>8}  result", "step", "seconds");
+    for (name, result, time) in &results {
+        let word = if result.is_ok() { "ok" } else { "FAILED" };
+        println!("{name:<20} {:>8.1}  {word}", time.as_secs_f64());
+    }
+    let total: Duration = results.iter().map(|(_, _, time)| *time).sum();
+    println!("{:<20} {:>8.1}", "all", total.as_secs_f64());
+    let failed: Vec<_> = results
+        .iter()
+        .filter(|(_, result, _)| result.is_err())
+        .map(|(name, ..)| *name)
+        .collect();
+    if !failed.is_empty() {
+        bail!("failed: {}", failed.join(", "));
+    }
+    println!("everything passed");
+    Ok(())
+}
+
+fn check_format() -> Result<()> {
+    run(cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn check_lints() -> Result<()> {
+    let arguments = [
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ];
+    run(cargo().args(arguments))
+}
+
+/// Runs all tests but those that need a vcan0, which are told that their turn comes later.
+fn run_tests() -> Result<()> {
+    let mut tests = cargo();
+    tests
+        .args(["test", "--workspace", "--no-fail-fast"])
+        .env("ANGUILLA_VCAN", "later");
+    if setup::python().is_file() {
+        tests.env("ANGUILLA_PYTHON", setup::python());
+    }
+    run(&mut tests)
+}
+
+/// Runs the tests that need a vcan0 beside one.
+fn run_vcan_tests() -> Result<()> {
+    let arguments = [
+        "test",
+        "--workspace",
+        "--test",
+        "socketcan",
+        "--no-run",
+        "--message-format=json",
+    ];
+    let messages = output(cargo().args(arguments))?;
+    let test = messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|message| message["target"]["name"] == "socketcan")
+        .find_map(|message| message["executable"].as_str().map(str::to_owned))
+        .context("cargo built no test named socketcan")?;
+    let folder = clean_root().join("tests");
+    env::set_current_dir(&folder)?;
+    let variables = [
+        ("ANGUILLA_PYTHON", path_text(setup::python().as_os_str())),
+        ("CARGO_MANIFEST_DIR", path_text(folder.as_os_str())),
+    ];
+    let words = [
+        test,
+        "--nocapture".to_owned(),
+        "--test-threads=1".to_owned(),
+    ];
+    let status = vcan::run(&words, &variables)?;
+    ensure!(status == 0, "the tests on vcan0 ended with status {status}");
+    Ok(())
+}
+
+/// Runs what a user runs first, shortly.
+fn run_main_job() -> Result<()> {
+    let out = clean_root().join("target/main-job");
+    let arguments = ["run", "--release", "--", "swim", "--seconds", "2", "--out"];
+    run(cargo().args(arguments).arg(out))
+}
+
+fn path_text(path: &OsStr) -> String {
+    path.to_string_lossy().into_owned()
+}
