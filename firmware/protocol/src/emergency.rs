@@ -110,6 +110,8 @@ catalogue! {
         "The head's heartbeat stopped, and the wrist lets go: check the head and the cable to it.";
     RPDO_LENGTH = 0x8210 "rpdo-length" Warning REGISTER_GENERIC | REGISTER_COMMUNICATION, "",
         "A PDO was shorter than its mapping and was not used: check who sends it, and the mapping.";
+    SYNC_LENGTH = 0x8240 "sync-length" Warning REGISTER_GENERIC | REGISTER_COMMUNICATION, "",
+        "SYNC came without its counter, or with more than it: check who sends it, and object 0x1019.";
     COMMAND_LOST = 0x8250 "command-lost" Fault REGISTER_GENERIC | REGISTER_COMMUNICATION,
         "silence in ms",
         "Targets stopped coming, and the wrist lets go: check the head's program and the bus load.";
@@ -261,6 +263,7 @@ mod tests {
             (0x7320, "encoder-invalid"),
             (0x8130, "head-lost"),
             (0x8210, "rpdo-length"),
+            (0x8240, "sync-length"),
             (0x8250, "command-lost"),
             (0x8611, "following-error"),
             (0x9000, "emergency-stop"),

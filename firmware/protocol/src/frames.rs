@@ -146,7 +146,7 @@ fn unpack_protected(bytes: &[u8; 8], cob_id: u16) -> Result<([Angle; 3], u8, Cou
     Ok((angles, code & 0x0F, counter))
 }
 
-/// Returns the eight bytes of a data frame under one of the identifiers `expected` accepts.
+/// Returns the eight bytes of a data frame.
 fn payload(frame: &Frame) -> Result<[u8; 8], FrameError> {
     frame.data().try_into().map_err(|_| FrameError::Length)
 }
@@ -172,6 +172,19 @@ impl Target {
             mode,
             counter,
         })
+    }
+
+    /// Unpacks a target frame with the vertebra it is for.
+    ///
+    /// # Errors
+    /// Any [`FrameError`].
+    pub fn from_frame(frame: &Frame) -> Result<(NodeId, Self), FrameError> {
+        let id = frame.cob_id().ok_or(FrameError::Identifier)?;
+        let Cob::Target(node) = Cob::from_id(id) else {
+            return Err(FrameError::Identifier);
+        };
+        let node = NodeId::new(node).ok_or(FrameError::Identifier)?;
+        Ok((node, Self::from_bytes(&payload(frame)?, id)?))
     }
 
     /// Returns the frame that carries the target to `node`.
@@ -277,6 +290,12 @@ impl Effort {
             la | (lb << 4),
             lc | (self.flags.to_bits() << 4),
         ]
+    }
+
+    /// Returns the last two bytes as a number: object 0x2011:4.
+    pub fn limits(&self) -> u16 {
+        let [_, _, _, _, _, _, low, high] = self.to_bytes();
+        u16::from_le_bytes([low, high])
     }
 
     /// Unpacks TPDO2's eight bytes.

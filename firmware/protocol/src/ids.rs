@@ -6,6 +6,8 @@ pub const VERTEBRAE: u8 = 10;
 pub const HEAD_NODE: u8 = 127;
 /// Time between two SYNCs in µs: 100 Hz.
 pub const SYNC_PERIOD_US: u32 = 10_000;
+/// Highest counter of SYNC, after which it is 1 again; object 0x1019.
+pub const SYNC_COUNTER_OVERFLOW: u8 = 240;
 /// Time between two heartbeats of the head in ms.
 pub const HEAD_HEARTBEAT_MS: u16 = 100;
 /// Silence of the head after which a vertebra lets go, in ms.

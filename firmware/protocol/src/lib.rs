@@ -12,8 +12,11 @@ extern crate std;
 mod crc;
 pub mod dictionary;
 pub mod emergency;
+pub mod export;
 mod frames;
+pub mod identity;
 mod ids;
+pub mod messages;
 pub mod pdo;
 mod states;
 mod status;
@@ -22,8 +25,8 @@ pub use crc::{crc8, protection};
 pub use eel_canopen::{Frame, Id};
 pub use frames::{Counter, Effort, Flags, FrameError, Moment, PoseReport, Target};
 pub use ids::{
-    Cob, HEAD_HEARTBEAT_MS, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, SYNC_PERIOD_US,
-    VERTEBRA_HEARTBEAT_MS, VERTEBRAE,
+    Cob, HEAD_HEARTBEAT_MS, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, SYNC_COUNTER_OVERFLOW,
+    SYNC_PERIOD_US, VERTEBRA_HEARTBEAT_MS, VERTEBRAE,
 };
 pub use states::{LimitCode, Mode, State};
 pub use status::{Condition, Status};

@@ -1,0 +1,216 @@
+//! The tables as a page of the documentation.
+
+use core::fmt::{Result, Write};
+
+use super::Decimal;
+use super::communication::AREA;
+use crate::dictionary::{OBJECTS, Pdo, Sub};
+use crate::emergency::CATALOGUE;
+use crate::messages::{MESSAGES, Sender};
+use crate::pdo::{PdoDefault, RPDOS, TPDOS};
+use crate::status::Condition;
+use eel_canopen::Access;
+
+/// Writes the page: messages, PDOs, dictionary, status word, emergencies.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_markdown(out: &mut dyn Write) -> Result {
+    writeln!(out, "# The vertebra on the bus\n")?;
+    writeln!(
+        out,
+        "Generated from `firmware/protocol` by `cargo xtask gen`; do not edit.\n"
+    )?;
+    writeln!(
+        out,
+        "Numbers are little-endian. Node ids: vertebrae 1 (behind the head) to 10, head 127."
+    )?;
+    write_messages(out)?;
+    write_pdos(out)?;
+    write_dictionary(out)?;
+    write_status(out)?;
+    write_emergencies(out)
+}
+
+fn write_messages(out: &mut dyn Write) -> Result {
+    for message in MESSAGES {
+        let node = if message.sender == Sender::Head {
+            ""
+        } else {
+            " + node id"
+        };
+        writeln!(
+            out,
+            "\n## Message `{}`: 0x{:03X}{node}\n",
+            message.name, message.cob_id_base
+        )?;
+        write!(out, "{} {} bytes", message.description, message.length)?;
+        match message.period_ms {
+            0 => writeln!(out, ", on event or request.\n")?,
+            period => writeln!(out, ", every {period} ms.\n")?,
+        }
+        writeln!(
+            out,
+            "| signal | bits | step | unit | meaning |\n|---|---|---|---|---|"
+        )?;
+        for signal in message.signals {
+            let last = signal.start + signal.bits - 1;
+            let sign = if signal.signed { " signed" } else { "" };
+            write!(
+                out,
+                "| `{}` | {}-{last}{sign} | {} | ",
+                signal.name,
+                signal.start,
+                Decimal(signal.scale)
+            )?;
+            write!(out, "{} | {}", signal.unit, signal.description)?;
+            if signal.name != "code" {
+                for (place, (code, name)) in signal.choices.iter().enumerate() {
+                    let lead = if place == 0 { " Codes: " } else { ", " };
+                    write!(out, "{lead}{code} {name}")?;
+                }
+            }
+            writeln!(out, " |")?;
+        }
+    }
+    Ok(())
+}
+
+fn write_pdos(out: &mut dyn Write) -> Result {
+    writeln!(out, "\n## PDOs at power-up\n")?;
+    writeln!(
+        out,
+        "| PDO | COB-ID | transmission | on | mapping |\n|---|---|---|---|---|"
+    )?;
+    let row = |out: &mut dyn Write, kind: &str, number: usize, pdo: &PdoDefault| {
+        let on = if pdo.enabled { "yes" } else { "no" };
+        write!(
+            out,
+            "| {kind}{number} | 0x{:03X} + node id | type {} | {on} |",
+            pdo.cob_id_base, pdo.transmission
+        )?;
+        for mapped in pdo.mapping {
+            write!(
+                out,
+                " {:04X}:{} ({} bit)",
+                mapped.index, mapped.subindex, mapped.bits
+            )?;
+        }
+        writeln!(out, " |")
+    };
+    for (number, pdo) in (1..).zip(RPDOS) {
+        row(out, "RPDO", number, pdo)?;
+    }
+    for (number, pdo) in (1..).zip(TPDOS) {
+        row(out, "TPDO", number, pdo)?;
+    }
+    Ok(())
+}
+
+fn write_dictionary(out: &mut dyn Write) -> Result {
+    writeln!(
+        out,
+        "\n## Objects 0x1000-0x1FFF\n\n| object | name |\n|---|---|"
+    )?;
+    for area in AREA {
+        writeln!(out, "| {:04X} | {} |", area.index, area.name)?;
+    }
+    writeln!(
+        out,
+        "| 1400, 1401 / 1600, 1601 | RPDO communication / mapping |"
+    )?;
+    writeln!(
+        out,
+        "| 1800, 1801 / 1A00, 1A01 | TPDO communication / mapping |"
+    )?;
+    for object in OBJECTS {
+        writeln!(
+            out,
+            "\n## Object {:04X} `{}`\n\n{}\n",
+            object.index, object.name, object.description
+        )?;
+        writeln!(
+            out,
+            "| entry | name | type | access | PDO | step | unit | default | range | meaning |"
+        )?;
+        writeln!(out, "|---|---|---|---|---|---|---|---|---|---|")?;
+        for sub in object.subs {
+            write!(
+                out,
+                "| {:04X}:{} | `{}` ",
+                object.index,
+                sub.subindex,
+                object.dotted(sub)
+            )?;
+            write_row(out, sub)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_row(out: &mut dyn Write, sub: &Sub) -> Result {
+    let access = match sub.access {
+        Access::Constant => "const",
+        Access::ReadOnly => "ro",
+        Access::WriteOnly => "wo",
+        Access::ReadWrite => "rw",
+    };
+    let pdo = match sub.pdo {
+        Pdo::No => "",
+        Pdo::Receive => "RPDO",
+        Pdo::Transmit => "TPDO",
+    };
+    write!(
+        out,
+        "| {} | {access} | {pdo} | {} ",
+        sub.data_type.name(),
+        Decimal(sub.scale)
+    )?;
+    write!(out, "| {} | {} ", sub.unit, sub.default)?;
+    writeln!(out, "| {} to {} | {} |", sub.min, sub.max, sub.description)
+}
+
+fn write_status(out: &mut dyn Write) -> Result {
+    writeln!(out, "\n## Status word, object 2010:6\n")?;
+    writeln!(
+        out,
+        "| bit | name | refuses enabling | meaning |\n|---|---|---|---|"
+    )?;
+    for condition in Condition::ALL {
+        let refuses = if condition.refuses() { "yes" } else { "no" };
+        let (bit, name) = (condition.bit(), condition.name());
+        writeln!(
+            out,
+            "| {bit} | {name} | {refuses} | {} |",
+            condition.sentence()
+        )?;
+    }
+    Ok(())
+}
+
+fn write_emergencies(out: &mut dyn Write) -> Result {
+    writeln!(out, "\n## Emergencies\n")?;
+    writeln!(
+        out,
+        "Bytes 3-7 of the message: motor (0 is the whole wrist), limit code, detail u16, reserved.\n"
+    )?;
+    writeln!(
+        out,
+        "| code | name | severity | register | detail | meaning |\n|---|---|---|---|---|---|"
+    )?;
+    for entry in CATALOGUE {
+        write!(
+            out,
+            "| {:04X} | {} | {} ",
+            entry.code,
+            entry.name,
+            entry.severity.name()
+        )?;
+        writeln!(
+            out,
+            "| {:02X} | {} | {} |",
+            entry.register, entry.detail, entry.sentence
+        )?;
+    }
+    Ok(())
+}
