@@ -110,6 +110,12 @@ pub trait Application {
     /// with identifier `cob_id`.
     fn rpdo_applied(&mut self, number: u8, cob_id: u16);
 
+    /// Hears that SYNC came: after its RPDOs were applied, before its TPDOs are read. `counter` is
+    /// what SYNC carried, if anything. Comes in Pre-operational too.
+    fn synchronised(&mut self, counter: Option<u8>) {
+        let _ = counter;
+    }
+
     /// Hears that TPDO `number` (1–4) is about to be read and sent as `cob_id`, so that its
     /// objects can be brought up to date.
     fn tpdo_due(&mut self, number: u8, cob_id: u16);

@@ -18,7 +18,12 @@ impl<const N: usize> Frame<N> {
     pub fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
         let mut bytes = [0; N];
         bytes.get_mut(..data.len())?.copy_from_slice(data);
-        Some(Self { id: id.into(), remote: false, length: data.len() as u8, data: bytes })
+        Some(Self {
+            id: id.into(),
+            remote: false,
+            length: data.len() as u8,
+            data: bytes,
+        })
     }
 
     /// Makes a data frame with an 11-bit identifier, of which the higher bits of `cob_id` are cut.
@@ -31,7 +36,12 @@ impl<const N: usize> Frame<N> {
         if usize::from(length) > N {
             return None;
         }
-        Some(Self { id: id.into(), remote: true, length, data: [0; N] })
+        Some(Self {
+            id: id.into(),
+            remote: true,
+            length,
+            data: [0; N],
+        })
     }
 
     /// Returns the identifier.
@@ -77,7 +87,11 @@ impl<const N: usize> Frame<N> {
     /// Returns the bytes; none of a remote frame.
     #[inline]
     pub fn data(&self) -> &[u8] {
-        if self.remote { &[] } else { self.data.get(..usize::from(self.length)).unwrap_or(&[]) }
+        if self.remote {
+            &[]
+        } else {
+            self.data.get(..usize::from(self.length)).unwrap_or(&[])
+        }
     }
 }
 

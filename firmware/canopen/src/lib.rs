@@ -7,7 +7,26 @@
 #![deny(clippy::float_arithmetic)]
 
 mod application;
+mod cob_id;
+mod communication;
+mod config;
+mod emergency;
+mod event;
 mod frame;
+mod heartbeat;
+mod nmt;
+mod node;
+mod objects;
+mod pdo;
+mod sdo;
+mod sync;
+mod transmit;
 
 pub use application::{Abort, Access, Application, Entry};
+pub use config::{Config, Identity, Mapped, PDOS, PdoDefault};
+pub use emergency::{REGISTER_COMMUNICATION, REGISTER_GENERIC};
+pub use event::Event;
 pub use frame::{Frame, Id};
+pub use nmt::{NmtCommand, NmtState};
+pub use node::{Counters, Node};
+pub use sdo::SDO_BUFFER;

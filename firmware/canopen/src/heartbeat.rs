@@ -1,0 +1,148 @@
+//! Heartbeats, sent and watched (CiA 301, 7.2.8.3.2, objects 0x1016 and 0x1017).
+
+use crate::{Abort, NmtState};
+
+/// Sends the node's state at a fixed period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Producer {
+    period_ms: u16,
+    due_us: u64,
+}
+
+impl Producer {
+    /// Starts with the boot-up message, which counts as the first heartbeat.
+    pub fn new(period_ms: u16, now_us: u64) -> Self {
+        let due_us = now_us.saturating_add(micros(period_ms));
+        Self { period_ms, due_us }
+    }
+
+    pub const fn period_ms(&self) -> u16 {
+        self.period_ms
+    }
+
+    /// Changes the period; the first heartbeat of the new one is due at once.
+    pub fn set_period(&mut self, period_ms: u16, now_us: u64) {
+        *self = Self {
+            period_ms,
+            due_us: now_us,
+        };
+    }
+
+    pub fn deadline_us(&self) -> Option<u64> {
+        (self.period_ms > 0).then_some(self.due_us)
+    }
+
+    /// Tells whether a heartbeat is due and counts it as sent. After a gap the missed ones are not
+    /// made up for.
+    pub fn is_due(&mut self, now_us: u64) -> bool {
+        if self.deadline_us().is_none_or(|due_us| now_us < due_us) {
+            return false;
+        }
+        let next_us = self.due_us.saturating_add(micros(self.period_ms));
+        self.due_us = if next_us > now_us {
+            next_us
+        } else {
+            now_us.saturating_add(micros(self.period_ms))
+        };
+        true
+    }
+}
+
+/// What the consumer makes of a heartbeat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Heard {
+    /// It had been lost before.
+    pub back: bool,
+    /// The state, where it differs from the last one.
+    pub changed: Option<NmtState>,
+}
+
+/// Watches one other node.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Consumer {
+    node: u8,
+    timeout_ms: u16,
+    state: Watch,
+    last: Option<NmtState>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Watch {
+    /// Nothing heard yet.
+    Waiting,
+    /// Heard; silence ends at this time.
+    Alive { deadline_us: u64 },
+    /// Silent for too long.
+    Lost,
+}
+
+impl Consumer {
+    pub fn new(configured: Option<(u8, u16)>) -> Self {
+        let (node, timeout_ms) = configured.unwrap_or((0, 0));
+        Self {
+            node,
+            timeout_ms,
+            state: Watch::Waiting,
+            last: None,
+        }
+    }
+
+    /// Returns object 0x1016, subindex 1.
+    pub fn to_raw(self) -> u32 {
+        u32::from(self.node) << 16 | u32::from(self.timeout_ms)
+    }
+
+    /// Makes a consumer from object 0x1016, subindex 1; it waits for the first heartbeat.
+    ///
+    /// # Errors
+    /// [`Abort::Value`] when reserved bits are set.
+    pub fn from_raw(raw: u32) -> Result<Self, Abort> {
+        match raw.to_be_bytes() {
+            [0, node, high, low] => Ok(Self::new(Some((node, u16::from_be_bytes([high, low]))))),
+            _ => Err(Abort::Value),
+        }
+    }
+
+    /// Returns the watched node; `None` when nothing is watched.
+    pub fn node(&self) -> Option<u8> {
+        (self.timeout_ms > 0 && matches!(self.node, 1..=127)).then_some(self.node)
+    }
+
+    pub fn is_lost(&self) -> bool {
+        self.state == Watch::Lost
+    }
+
+    pub fn hear(&mut self, byte: u8, now_us: u64) -> Heard {
+        let back = self.is_lost();
+        let deadline_us = now_us.saturating_add(micros(self.timeout_ms));
+        self.state = Watch::Alive { deadline_us };
+        let state = NmtState::from_heartbeat(byte);
+        let changed = state.filter(|_| state != self.last);
+        self.last = state;
+        Heard { back, changed }
+    }
+
+    pub fn deadline_us(&self) -> Option<u64> {
+        match self.state {
+            Watch::Alive { deadline_us } => Some(deadline_us),
+            Watch::Waiting | Watch::Lost => None,
+        }
+    }
+
+    /// Returns the watched node when it has just been lost.
+    pub fn expire(&mut self, now_us: u64) -> Option<u8> {
+        if self
+            .deadline_us()
+            .is_none_or(|deadline_us| now_us < deadline_us)
+        {
+            return None;
+        }
+        self.state = Watch::Lost;
+        self.last = None;
+        Some(self.node)
+    }
+}
+
+pub(crate) fn micros(milliseconds: u16) -> u64 {
+    u64::from(milliseconds) * 1_000
+}

@@ -1,0 +1,412 @@
+//! The node: frames and time in, frames and events out.
+
+use crate::communication::Communication;
+use crate::emergency::Fault;
+use crate::event::EventQueue;
+use crate::objects::Objects;
+use crate::pdo::Received;
+use crate::sdo::Server;
+use crate::transmit::TransmitQueue;
+use crate::{Application, Config, Event, Frame, NmtCommand, NmtState};
+
+/// What a node had to give up, counted since it was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames that found the transmit queue full and were dropped.
+    pub transmit_dropped: u32,
+    /// Events that nobody polled and that newer ones displaced.
+    pub events_dropped: u32,
+    /// Emergency messages that found their queue full; object 0x1003 has them still.
+    pub emergencies_dropped: u32,
+    /// RPDOs that were shorter than their mapping.
+    pub rpdos_short: u32,
+    /// RPDOs of which the application refused an object.
+    pub rpdos_refused: u32,
+}
+
+/// A CANopen slave: one node id on one bus.
+///
+/// Its owner gives it every frame of the bus and calls [`tick`](Self::tick) once per millisecond or
+/// so, or at [`next_deadline_us`](Self::next_deadline_us); then it drains
+/// [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event). Time is in
+/// microseconds from any start and never goes back.
+#[derive(Clone, Debug)]
+pub struct Node {
+    config: Config,
+    state: NmtState,
+    communication: Communication,
+    sdo: Server,
+    transmit: TransmitQueue,
+    events: EventQueue,
+    rpdos_short: u32,
+    rpdos_refused: u32,
+}
+
+impl Node {
+    /// Makes a node that is Pre-operational and whose boot-up message waits to be sent.
+    ///
+    /// With a node id outside 1–127 it is unconfigured: it stays `Initialising`, silent and deaf.
+    pub fn new(config: Config, now_us: u64) -> Self {
+        let mut node = Self {
+            config,
+            state: NmtState::Initialising,
+            communication: Communication::new(&config, now_us),
+            sdo: Server::new(),
+            transmit: TransmitQueue::default(),
+            events: EventQueue::default(),
+            rpdos_short: 0,
+            rpdos_refused: 0,
+        };
+        node.boot();
+        node
+    }
+
+    /// Takes a frame from the bus.
+    ///
+    /// Remote and extended frames are ignored. The work is bounded whatever the frame is: at most
+    /// four RPDOs are written, four TPDOs read, or one SDO request answered.
+    pub fn handle_frame(&mut self, now_us: u64, frame: &Frame, app: &mut impl Application) {
+        let Some(cob_id) = frame.cob_id() else { return };
+        if frame.is_remote() || self.state == NmtState::Initialising {
+            return;
+        }
+        self.expire(now_us);
+        let data = frame.data();
+        if cob_id == 0 {
+            self.command(now_us, data);
+        } else if self.communication.consumer.node().map(heartbeat_cob_id) == Some(cob_id) {
+            self.hear(now_us, data);
+        } else if self.state != NmtState::Stopped {
+            if cob_id == self.communication.sync.cob_id() {
+                self.synchronise(now_us, data, app);
+            } else if cob_id == 0x600 + u16::from(self.config.node_id) {
+                self.serve(now_us, data, app);
+            } else if self.state == NmtState::Operational {
+                self.receive(cob_id, data, app);
+            }
+        }
+        self.send_emergencies(now_us);
+    }
+
+    /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs.
+    pub fn tick(&mut self, now_us: u64, app: &mut impl Application) {
+        if self.state == NmtState::Initialising {
+            return;
+        }
+        self.expire(now_us);
+        if self.communication.producer.is_due(now_us) {
+            self.transmit
+                .replace(heartbeat_cob_id(self.config.node_id), &[self.state as u8]);
+        }
+        if self.state == NmtState::Operational {
+            for place in 0..self.communication.tpdos.len() {
+                let tpdo = self.communication.tpdos.get_mut(place);
+                if tpdo.is_some_and(|tpdo| tpdo.is_due_at(now_us)) {
+                    self.send_tpdo(place, now_us, app);
+                }
+            }
+        }
+        self.send_emergencies(now_us);
+    }
+
+    /// Returns the time at which [`tick`](Self::tick) has something to do; `None` when only a
+    /// frame can give the node work.
+    pub fn next_deadline_us(&self) -> Option<u64> {
+        if self.state == NmtState::Initialising {
+            return None;
+        }
+        let mut deadline = earlier(self.communication.deadline_us(), self.sdo.deadline_us());
+        if self.state != NmtState::Stopped {
+            deadline = earlier(deadline, self.communication.emergency.deadline_us());
+        }
+        if self.state == NmtState::Operational {
+            for tpdo in &self.communication.tpdos {
+                deadline = earlier(deadline, tpdo.deadline_us());
+            }
+        }
+        deadline
+    }
+
+    /// Takes the next frame to send.
+    ///
+    /// At most 16 wait. One that finds the queue full is dropped and counted
+    /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced.
+    pub fn poll_transmit(&mut self) -> Option<Frame> {
+        self.transmit.pop()
+    }
+
+    /// Takes the next event. At most 16 wait; the oldest are displaced and counted.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.pop()
+    }
+
+    /// Returns the state.
+    pub const fn nmt_state(&self) -> NmtState {
+        self.state
+    }
+
+    /// Returns the node id.
+    pub const fn node_id(&self) -> u8 {
+        self.config.node_id
+    }
+
+    /// Returns object 0x1001, the error register.
+    pub const fn error_register(&self) -> u8 {
+        self.communication.emergency.register()
+    }
+
+    /// Returns what the node had to give up.
+    pub const fn counters(&self) -> Counters {
+        Counters {
+            transmit_dropped: self.transmit.dropped(),
+            events_dropped: self.events.dropped(),
+            emergencies_dropped: self.communication.emergency.dropped(),
+            rpdos_short: self.rpdos_short,
+            rpdos_refused: self.rpdos_refused,
+        }
+    }
+
+    /// Tells the bus of an error of the application: sets `register_bits` in the error register
+    /// (0x1001), remembers the error (0x1003) and sends the emergency, at once or as soon as the
+    /// inhibit time (0x1015) and the state allow. At most eight wait; more are counted only.
+    pub fn emergency(&mut self, now_us: u64, code: u16, register_bits: u8, detail: [u8; 5]) {
+        self.communication
+            .emergency
+            .raise(code, register_bits, detail);
+        self.send_emergencies(now_us);
+    }
+
+    /// Tells the bus that an error of the application is gone: clears `register_bits` in the error
+    /// register and sends an emergency with code 0 and what is left of the register.
+    pub fn emergency_cleared(&mut self, now_us: u64, register_bits: u8) {
+        self.communication.emergency.clear(register_bits);
+        self.send_emergencies(now_us);
+    }
+
+    /// Asks for one transmission of TPDO `number` (1–4): type 0 sends it at the next SYNC, types
+    /// 254 and 255 at the next [`tick`](Self::tick) that the inhibit time allows. Has no effect
+    /// unless the node is Operational.
+    pub fn request_tpdo(&mut self, number: u8) {
+        let place = usize::from(number).wrapping_sub(1);
+        if self.state == NmtState::Operational
+            && let Some(tpdo) = self.communication.tpdos.get_mut(place)
+        {
+            tpdo.request();
+        }
+    }
+
+    fn boot(&mut self) {
+        if matches!(self.config.node_id, 1..=127) {
+            self.state = NmtState::PreOperational;
+            self.transmit
+                .push(heartbeat_cob_id(self.config.node_id), &[0]);
+        }
+    }
+
+    fn command(&mut self, now_us: u64, data: &[u8]) {
+        let Some(command) = NmtCommand::for_node(self.config.node_id, data) else {
+            return;
+        };
+        if command.is_reset() {
+            self.transmit.clear();
+            self.sdo.reset();
+            self.communication.reset(command, &self.config, now_us);
+            self.boot();
+        } else if command.target() == self.state {
+            return;
+        } else {
+            self.enter(command.target(), now_us);
+        }
+        self.events.push(Event::Nmt {
+            command,
+            state: self.state,
+        });
+    }
+
+    fn enter(&mut self, state: NmtState, now_us: u64) {
+        self.state = state;
+        for rpdo in &mut self.communication.rpdos {
+            rpdo.forget();
+        }
+        for tpdo in &mut self.communication.tpdos {
+            tpdo.restart(now_us);
+        }
+        if state == NmtState::Stopped {
+            self.sdo.reset();
+            self.transmit
+                .keep_only(heartbeat_cob_id(self.config.node_id));
+        }
+    }
+
+    /// Ends what has waited too long.
+    fn expire(&mut self, now_us: u64) {
+        if let Some(node) = self.communication.consumer.expire(now_us) {
+            self.events.push(Event::HeartbeatLost(node));
+            self.communication
+                .emergency
+                .raise_fault(Fault::Heartbeat, node);
+        }
+        if let Some(message) = self.sdo.expire(now_us) {
+            self.answer(message);
+        }
+    }
+
+    fn hear(&mut self, now_us: u64, data: &[u8]) {
+        let &[byte] = data else { return };
+        let Some(node) = self.communication.consumer.node() else {
+            return;
+        };
+        let heard = self.communication.consumer.hear(byte, now_us);
+        if heard.back {
+            self.events.push(Event::HeartbeatBack(node));
+            self.communication.emergency.clear_fault(Fault::Heartbeat);
+        }
+        if let Some(state) = heard.changed {
+            self.events.push(Event::RemoteState { node, state });
+        }
+    }
+
+    fn synchronise(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
+        let Some(counter) = self.communication.sync.counter(data) else {
+            self.events.push(Event::SyncLength);
+            let length = data.len() as u8;
+            self.communication
+                .emergency
+                .raise_fault(Fault::SyncLength, length);
+            return;
+        };
+        self.communication.emergency.clear_fault(Fault::SyncLength);
+        let operational = self.state == NmtState::Operational;
+        if operational {
+            for place in 0..self.communication.rpdos.len() {
+                self.apply_rpdo(place, app);
+            }
+        }
+        self.events.push(Event::Sync { counter });
+        app.synchronised(counter);
+        if operational {
+            for place in 0..self.communication.tpdos.len() {
+                let tpdo = self.communication.tpdos.get_mut(place);
+                if tpdo.is_some_and(|tpdo| tpdo.is_due_at_sync(counter)) {
+                    self.send_tpdo(place, now_us, app);
+                }
+            }
+        }
+    }
+
+    fn receive(&mut self, cob_id: u16, data: &[u8], app: &mut impl Application) {
+        for place in 0..self.communication.rpdos.len() {
+            let Some(rpdo) = self.communication.rpdos.get_mut(place) else {
+                return;
+            };
+            let number = place as u8 + 1;
+            let received = rpdo.receive(cob_id, data);
+            match received {
+                Received::Other => {}
+                Received::Short => {
+                    self.rpdos_short = self.rpdos_short.saturating_add(1);
+                    self.events.push(Event::RpdoLength { number });
+                    let fault = Fault::RpdoLength(number);
+                    self.communication.emergency.raise_fault(fault, number);
+                }
+                Received::Kept | Received::Due => {
+                    self.communication
+                        .emergency
+                        .clear_fault(Fault::RpdoLength(number));
+                    if received == Received::Due {
+                        self.apply_rpdo(place, app);
+                    }
+                }
+            }
+        }
+    }
+
+    fn apply_rpdo(&mut self, place: usize, app: &mut impl Application) {
+        let Some(rpdo) = self.communication.rpdos.get_mut(place) else {
+            return;
+        };
+        let number = place as u8 + 1;
+        if rpdo.apply(number, app) == Some(false) {
+            self.rpdos_refused = self.rpdos_refused.saturating_add(1);
+            self.events.push(Event::RpdoRefused { number });
+        }
+    }
+
+    fn send_tpdo(&mut self, place: usize, now_us: u64, app: &mut impl Application) {
+        let Some(parameters) = self
+            .communication
+            .tpdos
+            .get(place)
+            .map(|tpdo| tpdo.parameters)
+        else {
+            return;
+        };
+        app.tpdo_due(place as u8 + 1, parameters.cob_id());
+        let Self {
+            config,
+            communication,
+            ..
+        } = self;
+        let objects = Objects {
+            config,
+            communication,
+            app,
+            now_us,
+        };
+        let mut data = [0; 8];
+        let mut rest: &mut [u8] = &mut data;
+        for mapped in parameters.mapping() {
+            let Some((slot, others)) = rest.split_at_mut_checked(mapped.bytes()) else {
+                return;
+            };
+            if objects.read(mapped.index, mapped.subindex, slot) != Ok(slot.len()) {
+                return;
+            }
+            rest = others;
+        }
+        let data = data.get(..usize::from(parameters.bytes())).unwrap_or(&[]);
+        self.transmit.replace(parameters.cob_id(), data);
+    }
+
+    fn serve(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
+        let Ok(request) = data.try_into() else { return };
+        let Self {
+            config,
+            communication,
+            sdo,
+            ..
+        } = self;
+        let mut objects = Objects {
+            config,
+            communication,
+            app,
+            now_us,
+        };
+        if let Some(message) = sdo.request(request, &mut objects) {
+            self.answer(message);
+        }
+    }
+
+    fn answer(&mut self, message: [u8; 8]) {
+        self.transmit
+            .push(0x580 + u16::from(self.config.node_id), &message);
+    }
+
+    fn send_emergencies(&mut self, now_us: u64) {
+        if matches!(self.state, NmtState::Initialising | NmtState::Stopped) {
+            return;
+        }
+        while let Some(message) = self.communication.emergency.next(now_us) {
+            self.transmit
+                .push(self.communication.emergency.cob_id(), &message);
+        }
+    }
+}
+
+fn heartbeat_cob_id(node_id: u8) -> u16 {
+    0x700 + u16::from(node_id)
+}
+
+fn earlier(a: Option<u64>, b: Option<u64>) -> Option<u64> {
+    a.into_iter().chain(b).min()
+}

@@ -1,0 +1,233 @@
+//! The parameters and the mapping of a PDO, and the rules for changing them.
+
+use super::MAPPED_OBJECTS;
+use crate::cob_id::{self, FRAME_BIT, INVALID_BIT, NO_REMOTE_BIT};
+use crate::{Abort, Entry, Mapped, PdoDefault};
+
+/// Which way a PDO goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Direction {
+    Receive,
+    Transmit,
+}
+
+/// What objects 0x1400 and 0x1600 (or 0x1800 and 0x1A00) hold in common.
+///
+/// `count` is never more than the mapped objects that are there, and `bytes` is their length.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Parameters {
+    direction: Direction,
+    enabled: bool,
+    cob_id: u16,
+    transmission: u8,
+    count: u8,
+    bytes: u8,
+    mapping: [Mapped; MAPPED_OBJECTS],
+}
+
+impl Parameters {
+    /// Makes a PDO from its default for node `node_id`.
+    pub fn new(direction: Direction, default: &PdoDefault, node_id: u8) -> Self {
+        let mut parameters = Self {
+            direction,
+            enabled: false,
+            cob_id: default.cob_id_base.wrapping_add(u16::from(node_id)) & cob_id::MASK,
+            transmission: default.transmission,
+            count: 0,
+            bytes: 0,
+            mapping: [Mapped::default(); MAPPED_OBJECTS],
+        };
+        if default.is_valid() {
+            for (slot, mapped) in parameters.mapping.iter_mut().zip(default.mapping) {
+                *slot = *mapped;
+                parameters.count += 1;
+                parameters.bytes += mapped.bits / 8;
+            }
+            parameters.enabled = default.enabled;
+        }
+        parameters
+    }
+
+    /// Makes a PDO that the node does not have.
+    pub const fn absent(direction: Direction) -> Self {
+        Self {
+            direction,
+            enabled: false,
+            cob_id: 0,
+            transmission: 0,
+            count: 0,
+            bytes: 0,
+            mapping: [Mapped::new(0, 0, 0); MAPPED_OBJECTS],
+        }
+    }
+
+    pub const fn is_enabled(&self) -> bool {
+        self.enabled
+    }
+
+    pub const fn cob_id(&self) -> u16 {
+        self.cob_id
+    }
+
+    pub const fn transmission(&self) -> u8 {
+        self.transmission
+    }
+
+    /// Tells whether the PDO goes with SYNC.
+    pub const fn is_synchronous(&self) -> bool {
+        self.transmission <= 240
+    }
+
+    /// Returns the length of the mapped objects in bytes, at most 8.
+    pub const fn bytes(&self) -> u8 {
+        self.bytes
+    }
+
+    /// Returns the mapped objects, first to last.
+    pub fn mapping(&self) -> &[Mapped] {
+        self.mapping.get(..usize::from(self.count)).unwrap_or(&[])
+    }
+
+    /// Returns the number of mapped objects.
+    pub const fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// Returns a mapping entry, 1–8, be it active or not.
+    ///
+    /// # Errors
+    /// [`Abort::NoSubindex`].
+    pub fn entry(&self, subindex: u8) -> Result<u32, Abort> {
+        let slot = usize::from(subindex)
+            .checked_sub(1)
+            .and_then(|slot| self.mapping.get(slot));
+        slot.map(|mapped| mapped.to_raw()).ok_or(Abort::NoSubindex)
+    }
+
+    /// Returns the identifier with its flags.
+    pub fn raw_cob_id(&self) -> u32 {
+        let invalid = if self.enabled { 0 } else { INVALID_BIT };
+        let no_remote = if self.direction == Direction::Transmit {
+            NO_REMOTE_BIT
+        } else {
+            0
+        };
+        u32::from(self.cob_id) | invalid | no_remote
+    }
+
+    /// Writes the identifier, enables or disables the PDO.
+    ///
+    /// # Errors
+    /// [`Abort::Value`]: for an identifier that can't be, for another one while the PDO is
+    /// enabled, for enabling an empty PDO, and for a TPDO that would answer remote frames.
+    pub fn write_cob_id(&mut self, raw: u32) -> Result<(), Abort> {
+        let enable = raw & INVALID_BIT == 0;
+        let answers_remote = self.direction == Direction::Transmit && raw & NO_REMOTE_BIT == 0;
+        if raw & FRAME_BIT != 0 || answers_remote {
+            return Err(Abort::Value);
+        }
+        // A PDO that is only switched off keeps whatever identifier it had.
+        let raw_id = raw & !(INVALID_BIT | NO_REMOTE_BIT);
+        let same = raw_id == u32::from(self.cob_id);
+        let cob_id = if same && !enable {
+            self.cob_id
+        } else {
+            cob_id::parse(raw)?
+        };
+        if enable && (self.count == 0 || self.enabled && !same) {
+            return Err(Abort::Value);
+        }
+        self.cob_id = cob_id;
+        self.enabled = enable;
+        Ok(())
+    }
+
+    /// Writes the transmission type.
+    ///
+    /// # Errors
+    /// [`Abort::Value`] for 241–253, which are reserved or ask for remote frames.
+    pub fn write_transmission(&mut self, transmission: u8) -> Result<(), Abort> {
+        if matches!(transmission, 241..=253) {
+            return Err(Abort::Value);
+        }
+        self.transmission = transmission;
+        Ok(())
+    }
+
+    /// Writes the number of mapped objects, which makes the mapping active; 0 frees it.
+    ///
+    /// # Errors
+    /// [`Abort::UnsupportedAccess`] while the PDO is enabled, [`Abort::PdoLength`] for more than
+    /// eight objects or bytes, [`Abort::Incompatible`] for an entry that is empty.
+    pub fn write_count(&mut self, count: u8) -> Result<(), Abort> {
+        if self.enabled {
+            return Err(Abort::UnsupportedAccess);
+        }
+        let entries = self
+            .mapping
+            .get(..usize::from(count))
+            .ok_or(Abort::PdoLength)?;
+        if entries.iter().any(|mapped| mapped.bits == 0) {
+            return Err(Abort::Incompatible);
+        }
+        let bits: u32 = entries.iter().map(|mapped| u32::from(mapped.bits)).sum();
+        if bits > 64 {
+            return Err(Abort::PdoLength);
+        }
+        self.count = count;
+        self.bytes = (bits / 8) as u8;
+        Ok(())
+    }
+
+    /// Writes a mapping entry, 1–8; 0 empties it. `described` is what the dictionary says of the
+    /// object, and is not asked for dummies.
+    ///
+    /// # Errors
+    /// [`Abort::UnsupportedAccess`] while the mapping is active, [`Abort::NotMappable`] for an
+    /// object that does not go this way or has another length, the error of `described`.
+    pub fn write_entry(
+        &mut self,
+        subindex: u8,
+        raw: u32,
+        described: Result<Entry, Abort>,
+    ) -> Result<(), Abort> {
+        let slot = usize::from(subindex).wrapping_sub(1);
+        let slot = self.mapping.get_mut(slot).ok_or(Abort::NoSubindex)?;
+        if self.enabled || self.count != 0 {
+            return Err(Abort::UnsupportedAccess);
+        }
+        let mapped = Mapped::from_raw(raw);
+        if raw != 0 && mapped.is_dummy() {
+            check_dummy(self.direction, mapped)?;
+        } else if raw != 0 {
+            let entry = described?;
+            let allowed = match self.direction {
+                Direction::Receive => entry.rpdo,
+                Direction::Transmit => entry.tpdo,
+            };
+            let bits = entry.length.checked_mul(8);
+            if !allowed || entry.length == 0 || bits != Some(mapped.bits) {
+                return Err(Abort::NotMappable);
+            }
+        }
+        *slot = mapped;
+        Ok(())
+    }
+}
+
+/// Dummies have the index of their data type and stand for bytes that an RPDO skips.
+fn check_dummy(direction: Direction, mapped: Mapped) -> Result<(), Abort> {
+    let bits = match mapped.index {
+        2 | 5 => 8,
+        3 | 6 => 16,
+        4 | 7 => 32,
+        _ => 0,
+    };
+    if direction == Direction::Transmit || bits != mapped.bits || bits == 0 {
+        return Err(Abort::NotMappable);
+    }
+    if mapped.subindex != 0 {
+        return Err(Abort::NoSubindex);
+    }
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! A transmit PDO: when it is due.
+
+use super::{Direction, Parameters};
+use crate::heartbeat::micros;
+use crate::{Abort, PdoDefault};
+
+/// A transmit PDO.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tpdo {
+    pub parameters: Parameters,
+    inhibit_100us: u16,
+    event_ms: u16,
+    sync_start: u8,
+    /// SYNCs until the next transmission.
+    countdown: u8,
+    /// Waits for the SYNC whose counter is `sync_start`.
+    awaits_start: bool,
+    requested: bool,
+    inhibited_until_us: u64,
+    event_due_us: u64,
+}
+
+impl Tpdo {
+    pub fn new(default: Option<&PdoDefault>, node_id: u8) -> Self {
+        let parameters = match default {
+            Some(default) => Parameters::new(Direction::Transmit, default, node_id),
+            None => Parameters::absent(Direction::Transmit),
+        };
+        Self {
+            parameters,
+            inhibit_100us: 0,
+            event_ms: 0,
+            sync_start: 0,
+            countdown: parameters.transmission(),
+            awaits_start: false,
+            requested: false,
+            inhibited_until_us: 0,
+            event_due_us: 0,
+        }
+    }
+
+    /// Begins to count SYNCs and time: the node entered Operational, or the PDO was changed.
+    pub fn restart(&mut self, now_us: u64) {
+        self.countdown = self.parameters.transmission();
+        self.awaits_start = self.sync_start != 0;
+        self.requested = false;
+        self.inhibited_until_us = now_us;
+        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+    }
+
+    /// Asks for one transmission.
+    pub fn request(&mut self) {
+        self.requested = self.parameters.is_enabled();
+    }
+
+    /// Counts a SYNC and tells whether the PDO is due with it.
+    pub fn is_due_at_sync(&mut self, counter: Option<u8>) -> bool {
+        if !self.parameters.is_enabled() {
+            return false;
+        }
+        match self.parameters.transmission() {
+            0 => core::mem::take(&mut self.requested),
+            period @ 1..=240 => {
+                if self.awaits_start && counter.is_some_and(|counter| counter != self.sync_start) {
+                    return false;
+                }
+                let starts = core::mem::take(&mut self.awaits_start) && counter.is_some();
+                self.countdown = self.countdown.saturating_sub(1);
+                let due = starts || self.countdown == 0;
+                if due {
+                    self.countdown = period;
+                }
+                due
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns when an event-driven PDO must be looked at again.
+    pub fn deadline_us(&self) -> Option<u64> {
+        if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
+            return None;
+        }
+        if self.requested {
+            return Some(self.inhibited_until_us);
+        }
+        (self.event_ms > 0).then(|| self.event_due_us.max(self.inhibited_until_us))
+    }
+
+    /// Tells whether an event-driven PDO is due, and counts it as sent.
+    pub fn is_due_at(&mut self, now_us: u64) -> bool {
+        if self
+            .deadline_us()
+            .is_none_or(|deadline_us| now_us < deadline_us)
+        {
+            return false;
+        }
+        self.requested = false;
+        self.inhibited_until_us = now_us.saturating_add(u64::from(self.inhibit_100us) * 100);
+        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+        true
+    }
+
+    /// Returns object 0x1800, subindex 3, in 100 µs.
+    pub const fn inhibit_100us(&self) -> u16 {
+        self.inhibit_100us
+    }
+
+    /// Writes object 0x1800, subindex 3.
+    ///
+    /// # Errors
+    /// [`Abort::Value`] while the PDO is enabled.
+    pub fn write_inhibit(&mut self, inhibit_100us: u16) -> Result<(), Abort> {
+        if self.parameters.is_enabled() {
+            return Err(Abort::Value);
+        }
+        self.inhibit_100us = inhibit_100us;
+        Ok(())
+    }
+
+    /// Returns object 0x1800, subindex 5, in milliseconds.
+    pub const fn event_ms(&self) -> u16 {
+        self.event_ms
+    }
+
+    pub fn set_event(&mut self, event_ms: u16) {
+        self.event_ms = event_ms;
+    }
+
+    /// Returns object 0x1800, subindex 6.
+    pub const fn sync_start(&self) -> u8 {
+        self.sync_start
+    }
+
+    /// Writes object 0x1800, subindex 6.
+    ///
+    /// # Errors
+    /// [`Abort::Value`] while the PDO is enabled, and above 240.
+    pub fn write_sync_start(&mut self, sync_start: u8) -> Result<(), Abort> {
+        if self.parameters.is_enabled() || sync_start > 240 {
+            return Err(Abort::Value);
+        }
+        self.sync_start = sync_start;
+        Ok(())
+    }
+}
