@@ -20,6 +20,9 @@ pub const VERTEBRA_HEARTBEAT_MS: u16 = 200;
 pub struct NodeId(u8);
 
 impl NodeId {
+    /// The vertebra behind the head.
+    pub const FIRST: Self = Self(1);
+
     /// Makes a vertebra's node id; `None` outside 1–10.
     pub const fn new(raw: u8) -> Option<Self> {
         if raw >= 1 && raw <= VERTEBRAE {

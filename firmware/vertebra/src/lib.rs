@@ -2,10 +2,35 @@
 //!
 //! Frames and samples go in with the time, drives and frames come out. The same crate runs on the
 //! board, in QEMU and in the simulator, and gives the same bits.
+//!
+//! A turn of the control tick goes: frames to the node ([`eel_canopen`]), which hands process data
+//! to the core at SYNC; the sample to the encoders, the direct kinematics and the checks; the
+//! states; the impedance that pulls the pose to a spline through the targets; the torque sharing
+//! within the bounds of each motor; the duties of the bridges. What is deliberately absent: the
+//! clock, the bus, the bridges, and the current loop that a board closes faster than the tick.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
 
+mod command;
+mod core;
+mod current;
+mod encoder;
+mod events;
+mod impedance;
 mod io;
+mod limits;
+mod machine;
+mod objects;
+mod pending;
+mod settings;
+mod spline;
+mod vertebra;
+mod workspace;
 
+pub use command::TARGET_TIMEOUT;
+pub use events::Event;
 pub use io::{Drive, Sample};
+pub use machine::{STOP_BRAKE, STOP_DAMPED};
+pub use settings::{Gains, Limits, Motor, Ramp, Settings, Travel};
+pub use vertebra::{Vertebra, turn};

@@ -1,0 +1,302 @@
+//! The head: one beat after another.
+
+use eel_kinematics::Pose;
+use eel_protocol::emergency::EmergencyReport;
+use eel_protocol::{
+    Cob, Frame, FrameError, HEAD_HEARTBEAT_MS, HEAD_NODE, NodeId, PoseReport, SYNC_COUNTER_OVERFLOW,
+    SYNC_PERIOD_US, VERTEBRAE,
+};
+use eel_units::{Duration, Instant};
+use heapless::Deque;
+
+use crate::gait::Gait;
+use crate::node::{NodeStatus, Stage, Tracker, Wish, smooth_step};
+use crate::report::{Event, EventQueue};
+
+/// Frames that wait to be sent: two beats' worth.
+const WAITING: usize = 32;
+/// How long the gait waits for all vertebrae before it goes on with those that are there.
+const PATIENCE: Duration = Duration::from_millis(3_000);
+/// Longest time in which the gait fades out, in µs.
+const LONGEST_FADE_US: u32 = 2_000_000;
+/// One in Q15.
+const ONE: i64 = 1 << 15;
+/// How long the straight eel is held before its drives are switched off.
+const STRAIGHTENED: Duration = Duration::from_millis(500);
+/// How long "off" is sent before the nodes leave operation.
+const SWITCHED_OFF: Duration = Duration::from_millis(50);
+/// NMT commands (CiA 301, 7.2.8.3.1.1).
+const NMT_START: u8 = 1;
+const NMT_PRE_OPERATIONAL: u8 = 128;
+/// The head's own state in its heartbeat: operational.
+const OPERATIONAL: u8 = 5;
+
+/// How the head is set up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// How the eel moves.
+    pub gait: Gait,
+    /// Time between two SYNCs: 5–20 ms.
+    pub sync_period: Duration,
+    /// Which vertebrae are expected, bit 0 the first.
+    pub expected: u16,
+}
+
+impl Config {
+    /// Expects all ten vertebrae at the usual beat.
+    pub const fn new(gait: Gait) -> Self {
+        Self {
+            gait,
+            sync_period: Duration::from_micros(SYNC_PERIOD_US),
+            expected: (1 << VERTEBRAE) - 1,
+        }
+    }
+}
+
+/// What the head is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Bringing vertebrae up; they hold still.
+    Starting,
+    /// The gait runs.
+    Swimming,
+    /// The gait fades out and the eel straightens.
+    Straightening,
+    /// Drives are being switched off.
+    SwitchingOff,
+    /// Everything is off.
+    Stopped,
+}
+
+/// The head of the eel.
+#[derive(Clone, Debug)]
+pub struct Head {
+    config: Config,
+    phase: Phase,
+    since: Instant,
+    gait_start: Option<Instant>,
+    trackers: [Tracker; VERTEBRAE as usize],
+    next_sync: Instant,
+    next_heartbeat: Instant,
+    sync_counter: u8,
+    waiting: Deque<Frame, WAITING>,
+    dropped: u32,
+    events: EventQueue,
+}
+
+impl Head {
+    /// Starts a head that sends its first SYNC and heartbeat at once.
+    pub fn new(config: Config, now: Instant) -> Self {
+        let mut ids = NodeId::all();
+        let first = NodeId::FIRST;
+        Self {
+            config,
+            phase: Phase::Starting,
+            since: now,
+            gait_start: None,
+            trackers: core::array::from_fn(|_| Tracker::new(ids.next().unwrap_or(first))),
+            next_sync: now,
+            next_heartbeat: now,
+            sync_counter: 0,
+            waiting: Deque::new(),
+            dropped: 0,
+            events: EventQueue::default(),
+        }
+    }
+
+    /// Takes a frame from the bus.
+    pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
+        let Some(id) = frame.cob_id() else { return };
+        let cob = Cob::from_id(id);
+        let Some(node) = cob.node().and_then(NodeId::new) else { return };
+        let Some(tracker) = self.trackers.get_mut(node.index()) else { return };
+        match (cob, frame.data()) {
+            (Cob::Heartbeat(_), &[state]) => {
+                tracker.hear_heartbeat(now, state & 0x7F, &mut self.events);
+            }
+            (Cob::Pose(_), _) => match PoseReport::from_frame(frame) {
+                Ok((_, report)) => tracker.hear_pose(now, &report, &mut self.events),
+                Err(FrameError::Identifier) => {}
+                Err(_) => tracker.hear_bad_report(),
+            },
+            (Cob::Emergency(_), data) => {
+                if let Ok(bytes) = data.try_into() {
+                    let report = EmergencyReport::from_bytes(bytes);
+                    self.events.push(Event::Emergency(node, report));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Lets time pass: call it at least once a millisecond.
+    pub fn tick(&mut self, now: Instant) {
+        for tracker in &mut self.trackers {
+            tracker.watch(now, &mut self.events);
+        }
+        self.advance(now);
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + Duration::from_millis(u32::from(HEAD_HEARTBEAT_MS));
+            self.send(Cob::Heartbeat(HEAD_NODE), &[OPERATIONAL]);
+        }
+        if self.phase != Phase::Stopped {
+            self.start_nodes(now);
+        }
+        if now >= self.next_sync {
+            // The beat keeps its grid; only a long pause starts it anew.
+            let next = self.next_sync + self.config.sync_period;
+            self.next_sync = if next > now { next } else { now + self.config.sync_period };
+            self.beat(now);
+        }
+    }
+
+    /// Returns the next frame to send.
+    pub fn poll_transmit(&mut self) -> Option<Frame> {
+        self.waiting.pop_front()
+    }
+
+    /// Returns the next thing that happened.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.pop()
+    }
+
+    /// Lets the gait fade out, straightens the eel and switches it off.
+    pub fn stop(&mut self, now: Instant) {
+        if matches!(self.phase, Phase::Starting | Phase::Swimming) {
+            self.enter(now, Phase::Straightening);
+        }
+    }
+
+    /// Acknowledges latched stops of all vertebrae. Whoever calls it knows that moving is safe.
+    pub fn reset(&mut self) {
+        for tracker in &mut self.trackers {
+            tracker.reset();
+        }
+    }
+
+    /// Returns what the head is doing.
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Returns what is known of a vertebra.
+    pub fn node(&self, id: NodeId) -> Option<NodeStatus> {
+        self.trackers.get(id.index()).map(Tracker::status)
+    }
+
+    /// Returns how many vertebrae follow the gait.
+    pub fn running(&self) -> usize {
+        self.trackers.iter().filter(|tracker| tracker.status().stage == Stage::Running).count()
+    }
+
+    /// Returns how many frames found no room to wait.
+    pub const fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Moves from one phase to the next.
+    fn advance(&mut self, now: Instant) {
+        let elapsed = now.since(self.since);
+        match self.phase {
+            Phase::Starting if self.all_run() || elapsed >= PATIENCE && self.running() > 0 => {
+                self.gait_start = Some(now);
+                self.events.push(Event::GaitStarted);
+                self.enter(now, Phase::Swimming);
+            }
+            Phase::Straightening if elapsed.to_micros() >= self.fade() + STRAIGHTENED.to_micros() => {
+                self.enter(now, Phase::SwitchingOff);
+            }
+            Phase::SwitchingOff if elapsed >= SWITCHED_OFF => {
+                self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
+                self.events.push(Event::Stopped);
+                self.enter(now, Phase::Stopped);
+            }
+            _ => {}
+        }
+    }
+
+    fn enter(&mut self, now: Instant, phase: Phase) {
+        self.phase = phase;
+        self.since = now;
+    }
+
+    fn all_run(&self) -> bool {
+        let expects = |id: NodeId| self.config.expected & (1 << id.index()) != 0;
+        self.trackers
+            .iter()
+            .filter(|tracker| expects(tracker.id()))
+            .all(|tracker| tracker.status().stage == Stage::Running)
+    }
+
+    fn start_nodes(&mut self, now: Instant) {
+        for index in 0..self.trackers.len() {
+            let Some(tracker) = self.trackers.get_mut(index) else { break };
+            if tracker.wants_start(now) {
+                let id = tracker.id().get();
+                self.send(Cob::Nmt, &[NMT_START, id]);
+            }
+        }
+    }
+
+    /// Sends SYNC, then the targets that the next SYNC will release.
+    fn beat(&mut self, now: Instant) {
+        self.sync_counter =
+            if self.sync_counter >= SYNC_COUNTER_OVERFLOW { 1 } else { self.sync_counter + 1 };
+        self.send(Cob::Sync, &[self.sync_counter]);
+        if self.phase == Phase::Stopped {
+            return;
+        }
+        let wish = if self.phase == Phase::SwitchingOff { Wish::Off } else { Wish::Run };
+        let poses = self.gait_poses(now);
+        for (index, pose) in poses.into_iter().enumerate() {
+            let Some(tracker) = self.trackers.get_mut(index) else { break };
+            if tracker.status().stage == Stage::Missing {
+                continue;
+            }
+            let target = tracker.next_target(now, wish, pose);
+            let id = tracker.id();
+            if let Some(frame) = target.to_frame(id) {
+                self.queue(frame);
+            }
+        }
+    }
+
+    /// Returns the gait's poses at `now`, scaled by the start and the stop.
+    fn gait_poses(&self, now: Instant) -> [Pose; VERTEBRAE as usize] {
+        let Some(start) = self.gait_start else { return [Pose::default(); VERTEBRAE as usize] };
+        let fade = self.fade();
+        let grown = share(self.gait_start, now, 2 * fade);
+        let scale = match self.phase {
+            Phase::Swimming => grown,
+            Phase::Straightening => {
+                let reached = share(self.gait_start, self.since, 2 * fade);
+                (reached * (ONE - share(Some(self.since), now, fade))) >> 15
+            }
+            _ => 0,
+        };
+        self.config.gait.poses(now.to_micros().saturating_sub(start.to_micros()), scale)
+    }
+
+    /// Returns how long the gait takes to fade out in µs: one cycle, at most two seconds.
+    fn fade(&self) -> u32 {
+        self.config.gait.period_us().min(LONGEST_FADE_US)
+    }
+
+    fn send(&mut self, cob: Cob, data: &[u8]) {
+        if let Some(frame) = Frame::standard(cob.id(), data) {
+            self.queue(frame);
+        }
+    }
+
+    fn queue(&mut self, frame: Frame) {
+        if self.waiting.push_back(frame).is_err() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
+    }
+}
+
+/// Returns how far `now` is on a smooth step of `length_us` that began at `since`, in Q15.
+fn share(since: Option<Instant>, now: Instant, length_us: u32) -> i64 {
+    let Some(since) = since else { return 0 };
+    smooth_step((i64::from(now.since(since).to_micros()) << 15) / i64::from(length_us.max(1)))
+}

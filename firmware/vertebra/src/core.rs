@@ -1,0 +1,500 @@
+//! The vertebra behind its node: estimation, states, control, protection.
+
+use eel_kinematics::{Joints, Pose};
+use eel_protocol::emergency::{Emergency, Source};
+use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, Mode, State, Status};
+use eel_units::{Angle, Instant, Torque};
+
+use crate::command::{BRIDGED_PERIODS, CommandStream, Received};
+use crate::current::{CurrentState, Electrical};
+use crate::encoder::{Encoder, EncoderFault};
+use crate::events::{Event, EventQueue};
+use crate::impedance::{FeedForward, Impedance, Motion};
+use crate::io::{Drive, Sample};
+use crate::limits::{MotorBounds, Situation, bounds};
+use crate::machine::{Machine, Outcome, STOP_DAMPED};
+use crate::objects::{Counters, ReceivedTarget, Timing};
+use crate::pending::Pending;
+use crate::settings::Settings;
+use crate::spline::{Reference, Spline};
+use crate::workspace::{Limited, admit, is_believable};
+
+/// Deviation from the reference that is worth a warning: 150 mrad.
+const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
+/// Conditions that a fault reset can't clear because the reset itself, or time, does.
+const CLEARED_BY_RESET: [Condition; 4] = [
+    Condition::Latched,
+    Condition::CommandLost,
+    Condition::Encoders,
+    Condition::NotOperational,
+];
+
+/// Everything of a vertebra but its node.
+#[derive(Clone, Debug)]
+pub(crate) struct Core {
+    pub settings: Settings,
+    pub impedance: Impedance,
+    pub electrical: Electrical,
+    pub now: Instant,
+    pub operational: bool,
+    pub encoders: [Encoder; 3],
+    currents: [CurrentState; 3],
+    pub machine: Machine,
+    pub stream: CommandStream,
+    spline: Spline,
+    hold: Pose,
+    pub motion: Option<Motion>,
+    pub pose: Pose,
+    pub target: ReceivedTarget,
+    pub feed_forward: FeedForward,
+    pub received_feed: FeedForward,
+    pub status: Status,
+    limited: Limited,
+    pub effort: Effort,
+    pub achieved: [Torque; 3],
+    pub unallocated: [Torque; 3],
+    pub reference: Option<Reference>,
+    pub pose_counter: Counter,
+    pub pose_bytes: [u8; 8],
+    pub sample: Option<Sample>,
+    pub counters: Counters,
+    pub timing: Timing,
+    pub pending: Pending,
+    pub events: EventQueue,
+}
+
+impl Core {
+    /// Starts at power-up.
+    pub fn new(settings: Settings, now: Instant) -> Self {
+        let encoder = Encoder::new(&settings.motor);
+        Self {
+            impedance: Impedance::new(&settings.gains),
+            electrical: Electrical::new(&settings.motor),
+            now,
+            operational: false,
+            encoders: [encoder; 3],
+            currents: [CurrentState::default(); 3],
+            machine: Machine::new(now),
+            stream: CommandStream::new(now),
+            spline: Spline::at_rest(Pose::default()),
+            hold: Pose::default(),
+            motion: None,
+            pose: Pose::default(),
+            target: ReceivedTarget::default(),
+            feed_forward: FeedForward::NEUTRAL,
+            received_feed: FeedForward::NEUTRAL,
+            status: Status::NONE,
+            limited: Limited::default(),
+            effort: Effort {
+                torque: [Torque::ZERO; 3],
+                limit: [LimitCode::Off; 3],
+                flags: Flags::default(),
+            },
+            achieved: [Torque::ZERO; 3],
+            unallocated: [Torque::ZERO; 3],
+            reference: None,
+            pose_counter: Counter::default(),
+            pose_bytes: [0; 8],
+            sample: None,
+            counters: Counters::default(),
+            timing: Timing::default(),
+            pending: Pending::default(),
+            events: EventQueue::default(),
+            settings,
+        }
+    }
+
+    /// Does one control tick.
+    pub fn tick(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
+        self.now = now;
+        self.sample = Some(*sample);
+        self.estimate(sample);
+        self.watch(sample);
+        self.bridge_missing_targets();
+        let before = self.machine.state();
+        let aligned = self.encoders.iter().all(Encoder::is_aligned);
+        self.machine.advance(now, aligned, self.status.refusals().is_empty());
+        self.note_state(before);
+        let drives = self.drive(sample);
+        self.report();
+        drives
+    }
+
+    /// Turns readings into angles, speeds and the pose.
+    fn estimate(&mut self, sample: &Sample) {
+        let readings = sample.encoder_counts.into_iter().zip(sample.absolute);
+        for (motor, (encoder, (count, absolute))) in
+            self.encoders.iter_mut().zip(readings).enumerate()
+        {
+            let was_aligned = encoder.is_aligned();
+            let Err(fault) = encoder.update(count, absolute) else { continue };
+            if !was_aligned {
+                continue;
+            }
+            let emergency = match fault {
+                EncoderFault::Invalid => Emergency::ENCODER_INVALID,
+                EncoderFault::Implausible => Emergency::ENCODER_IMPLAUSIBLE,
+            };
+            self.pending.fault(emergency, Some(motor), 0);
+        }
+        let aligned = self.encoders.iter().all(Encoder::is_aligned);
+        self.motion = if aligned { self.moving() } else { None };
+        if let Some(motion) = &self.motion {
+            self.pose = motion.direct.rotation.to_pose();
+        } else if aligned && self.machine.is_enabled() {
+            self.pending.fault(Emergency::OUT_OF_REACH, None, 0);
+        }
+        self.take_faults();
+    }
+
+    /// Returns where the wrist is and how it moves; `None` where it can't be.
+    fn moving(&self) -> Option<Motion> {
+        let [a, b, c] = &self.encoders;
+        let direct = self.settings.wrist.direct(&Joints([a.angle(), b.angle(), c.angle()])).ok()?;
+        let omega = direct.jacobian.angular_velocity([a.speed(), b.speed(), c.speed()]);
+        Some(Motion { direct, omega })
+    }
+
+    /// Holds every reading against its limit and decides what may be enabled.
+    fn watch(&mut self, sample: &Sample) {
+        let limits = &self.settings.limits;
+        let low = sample.supply <= limits.supply_low.end;
+        let high = sample.supply >= limits.supply_high.end;
+        let board_hot = sample.board_temperature >= limits.board_hot.end;
+        let hot_motor =
+            sample.motor_temperature.iter().position(|value| *value >= limits.motor_hot.end);
+        let bridge = sample.bridge_fault.iter().position(|fault| *fault);
+        let aligned = self.encoders.iter().all(Encoder::is_aligned);
+        let believable = self.motion.is_some() && is_believable(&self.pose, limits);
+        self.status = self
+            .status
+            .with(Condition::Settings, !self.settings.are_sound())
+            .with(Condition::Encoders, !aligned)
+            .with(Condition::Pose, aligned && !believable)
+            .with(Condition::Voltage, low || high)
+            .with(Condition::Temperature, board_hot || hot_motor.is_some())
+            .with(Condition::Bridge, bridge.is_some())
+            .with(Condition::EmergencyStop, sample.emergency_stop)
+            .with(Condition::NotOperational, !self.operational);
+        if let Some(motor) = bridge {
+            self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
+        }
+        if self.machine.is_enabled() {
+            let centivolts = (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
+            if low {
+                self.pending.fault(Emergency::UNDER_VOLTAGE, None, centivolts);
+            } else if high {
+                self.pending.fault(Emergency::OVER_VOLTAGE, None, centivolts);
+            }
+            let decidegrees = |value: eel_units::Temperature| value.to_decidegrees() as u16;
+            if board_hot {
+                let detail = decidegrees(sample.board_temperature);
+                self.pending.fault(Emergency::BOARD_OVER_TEMPERATURE, None, detail);
+            }
+            if let Some(motor) = hot_motor {
+                let hot = sample.motor_temperature.get(motor).copied().unwrap_or_default();
+                let detail = decidegrees(hot);
+                self.pending.fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
+            }
+        }
+        self.take_faults();
+        if sample.emergency_stop {
+            self.emergency_stop(Emergency::EMERGENCY_STOP);
+        }
+        if self.machine.is_enabled() && self.stream.is_lost(self.now) {
+            self.stop(Emergency::COMMAND_LOST, crate::command::TARGET_TIMEOUT.to_micros() / 1_000);
+            self.status = self.status.with(Condition::CommandLost, true);
+        }
+        self.status = self.status.with(Condition::Latched, self.machine.state().is_latched());
+    }
+
+    /// Enters the fault state for the first fault that waits.
+    fn take_faults(&mut self) {
+        let Some((emergency, source)) = self.pending.first_fault() else { return };
+        let before = self.machine.state();
+        let motor = usize::from(source.motor).checked_sub(1);
+        if self.machine.fault(self.now, motor) {
+            self.emit(emergency, source);
+        }
+        self.note_state(before);
+    }
+
+    /// Lets the path go on, or come to rest, while SYNCs or targets are missing.
+    fn bridge_missing_targets(&mut self) {
+        if self.stream.sync_overdue(self.now) {
+            let missed = self.stream.begin_segment(self.now);
+            self.continue_path(missed);
+        }
+    }
+
+    /// Takes a SYNC; targets have been received just before.
+    pub fn synchronise(&mut self, now: Instant) {
+        self.timing.note_sync(now);
+        self.feed_forward = self.received_feed;
+        let missed = self.stream.synchronise(now);
+        self.continue_path(missed);
+    }
+
+    /// Begins the next segment of the path after `missed` periods without a target.
+    fn continue_path(&mut self, missed: u8) {
+        let late = missed > BRIDGED_PERIODS && self.machine.state() == State::Run;
+        if late && !self.status.contains(Condition::CommandLate) {
+            self.emit(
+                Emergency::COMMAND_LATE,
+                Source { motor: 0, limit: 0, detail: u16::from(missed) },
+            );
+        }
+        self.status = self.status.with(Condition::CommandLate, late);
+        if missed == 0 {
+            return;
+        }
+        let wanted =
+            if missed <= BRIDGED_PERIODS { self.spline.continued() } else { self.spline.newest() };
+        self.follow(wanted);
+    }
+
+    /// Admits a pose and makes it the end of the next segment.
+    fn follow(&mut self, wanted: Pose) -> Limited {
+        let (_, period) = self.stream.place(self.now);
+        let previous = self.spline.newest();
+        let Settings { limits, wrist, .. } = &self.settings;
+        let (pose, limited) = admit(wanted, previous, period, limits, wrist);
+        self.spline.push(pose);
+        limited
+    }
+
+    /// Takes a target frame that SYNC has released.
+    pub fn receive_target(&mut self, bytes: &[u8; 8], cob_id: u16) {
+        let target = match self.stream.receive(self.now, bytes, cob_id) {
+            Received::Target(target) => target,
+            Received::Ignored => return,
+            Received::TooManyBad => {
+                let bad = self.stream.counters().bad.min(0xFFFF);
+                self.stop(Emergency::COMMAND_BAD, bad);
+                self.status = self.status.with(Condition::CommandLost, true);
+                return;
+            }
+        };
+        self.command(target.mode);
+        if self.machine.state() != State::Run {
+            self.note_limited(Limited::default());
+            return;
+        }
+        let wanted = Pose { yaw: target.yaw, pitch: target.pitch, roll: target.roll };
+        let limited = self.follow(wanted);
+        self.note_limited(limited);
+    }
+
+    /// Remembers whether the target was limited and warns when that begins.
+    fn note_limited(&mut self, limited: Limited) {
+        if limited.any() && !self.limited.any() {
+            let detail = u16::from(limited.bits());
+            self.emit(Emergency::TARGET_LIMITED, Source { motor: 0, limit: 0, detail });
+        }
+        self.limited = limited;
+        self.status = self.status.with(Condition::TargetLimited, limited.any());
+    }
+
+    /// Takes the mode of a target.
+    fn command(&mut self, mode: Mode) {
+        let before = self.machine.state();
+        let standing = CLEARED_BY_RESET
+            .iter()
+            .fold(self.status, |status, condition| status.with(*condition, false));
+        let outcome = self.machine.command(self.now, mode, standing.refusals().is_empty());
+        if outcome == Outcome::Reset {
+            self.reset_faults();
+        }
+        let after = self.machine.state();
+        if after != before {
+            self.currents = [CurrentState::default(); 3];
+            match after {
+                State::Run => self.spline = Spline::at_rest(self.pose),
+                State::Hold => self.hold = self.pose,
+                _ => {}
+            }
+        }
+        self.note_state(before);
+    }
+
+    /// Forgets what a fault reset clears; encoders that failed align again.
+    fn reset_faults(&mut self) {
+        for (encoder, failed) in self.encoders.iter_mut().zip(self.pending.failed_encoders()) {
+            if failed {
+                *encoder = Encoder::new(&self.settings.motor);
+            }
+        }
+        self.pending.clear();
+        self.status = self.status.with(Condition::CommandLost, false);
+        self.emit(Emergency::CLEARED, Source::WHOLE);
+    }
+
+    /// Stops in order, with the reason, when enabled.
+    pub fn stop(&mut self, emergency: Emergency, detail: u32) {
+        let before = self.machine.state();
+        if self.machine.stop(self.now) {
+            let detail = detail.min(0xFFFF) as u16;
+            self.emit(emergency, Source { motor: 0, limit: 0, detail });
+        }
+        self.note_state(before);
+    }
+
+    /// Switches off at once, with the reason.
+    pub fn emergency_stop(&mut self, emergency: Emergency) {
+        let before = self.machine.state();
+        if self.machine.emergency_stop(self.now) {
+            self.emit(emergency, Source::WHOLE);
+        }
+        self.note_state(before);
+    }
+
+    /// Stops by NMT: in order when enabled, and latched in any case.
+    pub fn latch_stop(&mut self) {
+        if self.machine.is_enabled() {
+            self.stop(Emergency::STOPPED_BY_NMT, 0);
+        } else {
+            self.emergency_stop(Emergency::STOPPED_BY_NMT);
+        }
+    }
+
+    /// Lets go because the head's heartbeat is missing; the node sends the emergency itself.
+    pub fn lose_head(&mut self) {
+        let before = self.machine.state();
+        self.status = self.status.with(Condition::HeadLost, true);
+        self.machine.stop(self.now);
+        self.note_state(before);
+    }
+
+    /// Hears the head again, which by itself moves nothing.
+    pub fn hear_head(&mut self) {
+        self.status = self.status.with(Condition::HeadLost, false);
+    }
+
+    fn emit(&mut self, emergency: Emergency, source: Source) {
+        self.pending.push(emergency, source);
+        self.events.push(Event::Emergency { emergency, source });
+    }
+
+    fn note_state(&mut self, from: State) {
+        let to = self.machine.state();
+        if from != to {
+            self.events.push(Event::State { from, to });
+        }
+    }
+
+    /// Returns what the bridges do until the next tick.
+    fn drive(&mut self, sample: &Sample) -> [Drive; 3] {
+        self.reference = None;
+        self.achieved = [Torque::ZERO; 3];
+        self.unallocated = [Torque::ZERO; 3];
+        self.effort.limit = [LimitCode::Off; 3];
+        let cap = match self.machine.state() {
+            State::Run | State::Hold => None,
+            State::Damped => Some(self.settings.limits.damped_torque),
+            State::StopDamped => Some(self.stop_cap()),
+            State::Brake | State::StopBrake => return [Drive::Brake; 3],
+            State::Fault => return self.fault_drives(sample),
+            State::NotReady | State::SwitchedOff | State::Ready | State::StopOff => {
+                return [Drive::Off; 3];
+            }
+        };
+        let Some(motion) = self.motion else { return [Drive::Brake; 3] };
+        let moment = match self.machine.state() {
+            State::Run => {
+                let (elapsed, period) = self.stream.place(self.now);
+                self.pull(&motion, self.spline.reference(elapsed, period))
+            }
+            State::Hold => self.pull(&motion, Reference::at_rest(self.hold)),
+            _ => self.impedance.damping(&motion),
+        };
+        self.share(&motion, moment, cap, sample)
+    }
+
+    /// Returns the moment towards a reference, and remembers how far off the wrist is.
+    fn pull(&mut self, motion: &Motion, reference: Reference) -> [Torque; 3] {
+        let (moment, error) = self.impedance.moment(motion, &reference, &self.feed_forward);
+        let far = error.iter().any(|axis| axis.abs() > FOLLOWING_LIMIT);
+        if far && !self.status.contains(Condition::FollowingError) {
+            let worst = error.iter().map(|axis| axis.abs()).max().unwrap_or_default();
+            let detail = worst.to_tenth_milliradians().unsigned_abs();
+            self.emit(Emergency::FOLLOWING_ERROR, Source { motor: 0, limit: 0, detail });
+        }
+        self.status = self.status.with(Condition::FollowingError, far);
+        self.reference = Some(reference);
+        moment
+    }
+
+    /// Shares a moment among the motors within their bounds and turns torques into duties.
+    fn share(
+        &mut self,
+        motion: &Motion,
+        moment: [Torque; 3],
+        command_cap: Option<Torque>,
+        sample: &Sample,
+    ) -> [Drive; 3] {
+        let angles = self.angles();
+        let speeds = self.encoders.each_ref().map(Encoder::speed);
+        let situation = Situation { sample, angles, speeds, command_cap };
+        let bounds: [MotorBounds; 3] =
+            bounds(&self.settings.limits, &self.electrical, &situation);
+        let shared =
+            motion.direct.jacobian.share(moment, &bounds.each_ref().map(|motor| motor.torque));
+        self.achieved = shared.achieved;
+        self.unallocated = shared.unallocated;
+        let mut limit = [LimitCode::None; 3];
+        let mut drives = [Drive::Off; 3];
+        let motors = drives.iter_mut().zip(&mut limit).zip(&mut self.currents).zip(&bounds);
+        for (motor, (((drive, limit), state), bounds)) in motors.enumerate() {
+            let pick = |values: &[Torque; 3]| values.get(motor).copied().unwrap_or_default();
+            let speed = speeds.get(motor).copied().unwrap_or_default();
+            let measured = sample.current.get(motor).copied().unwrap_or_default();
+            *limit = bounds.reason(shared.bound.get(motor).copied().flatten());
+            let torque = pick(&shared.torque);
+            let supply = sample.supply;
+            *drive = Drive::Duty(self.electrical.duty(state, torque, speed, measured, supply));
+        }
+        self.effort.limit = limit;
+        drives
+    }
+
+    /// Returns the torque that a stop still allows: it falls to nothing with time.
+    fn stop_cap(&self) -> Torque {
+        let elapsed = self.machine.elapsed(self.now).to_micros();
+        let left = STOP_DAMPED.to_micros().saturating_sub(elapsed);
+        let peak = i64::from(self.settings.limits.peak_torque.to_q24());
+        Torque::from_q24((peak * i64::from(left) / i64::from(STOP_DAMPED.to_micros())) as i32)
+    }
+
+    /// Returns the drives of a fault: the motor at fault is off, the others brake, then all off.
+    fn fault_drives(&self, sample: &Sample) -> [Drive; 3] {
+        if sample.emergency_stop || self.machine.elapsed(self.now) >= crate::machine::STOP_BRAKE {
+            return [Drive::Off; 3];
+        }
+        let mut drives = [Drive::Brake; 3];
+        if let Some(drive) = self.machine.faulty_motor().and_then(|motor| drives.get_mut(motor)) {
+            *drive = Drive::Off;
+        }
+        drives
+    }
+
+    /// Brings what the head will read up to date.
+    fn report(&mut self) {
+        let moment_limited = self.unallocated.iter().any(|axis| *axis != Torque::ZERO);
+        self.status = self.status.with(Condition::MomentLimited, moment_limited);
+        if let Some(sample) = &self.sample {
+            self.effort.torque = sample.current.map(|current| self.electrical.torque(current));
+        }
+        let holds = |condition| self.status.contains(condition);
+        self.effort.flags = Flags {
+            target_limited: holds(Condition::TargetLimited),
+            moment_limited,
+            command_lost: holds(Condition::CommandLost) || holds(Condition::CommandLate),
+            warning: holds(Condition::FollowingError),
+        };
+    }
+
+    /// Returns the angle of each motor.
+    pub fn angles(&self) -> [Angle; 3] {
+        self.encoders.each_ref().map(Encoder::angle)
+    }
+}

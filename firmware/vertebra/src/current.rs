@@ -1,0 +1,177 @@
+//! From torque to the share of the supply voltage that drives it.
+//!
+//! The winding settles within a tick, so the voltage that a current needs is known: R i + k ω. A
+//! slow integral takes up what resistance and supply really are. The 20 kHz loop of the board will
+//! take this place.
+
+use eel_units::{AngularVelocity, Current, Duty, Torque, Voltage, saturate};
+
+use crate::settings::Motor;
+
+/// Share of the current error that enters the integral each tick, as a shift.
+const INTEGRAL_SHIFT: u32 = 4;
+/// Most voltage that the integral may add.
+const INTEGRAL_LIMIT_MV: i64 = 3_000;
+/// Least supply that a duty is computed for.
+const SUPPLY_FLOOR_MV: i64 = 1_000;
+
+/// A motor's constants, prepared for the tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Electrical {
+    /// Current per torque: µA per N·m.
+    microamps_per_newton_metre: i64,
+    /// Torque per current: Q24 N·m per µA, in Q20.
+    torque_per_microamp: i64,
+    /// Voltage per current: mV per µA, in Q30.
+    millivolts_per_microamp: i64,
+    /// Voltage per speed: mV per Q24 rad/s, in Q34.
+    millivolts_per_speed: i64,
+    /// Torque per voltage: Q24 N·m per mV.
+    torque_per_millivolt: i64,
+    current_limit: Current,
+}
+
+/// What the current controller of one motor remembers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CurrentState {
+    wanted: Current,
+    integral_mv: i64,
+    saturated: bool,
+}
+
+impl Electrical {
+    /// Prepares the constants; zeros in the settings become the smallest sensible values.
+    pub const fn new(motor: &Motor) -> Self {
+        let constant = at_least_one(motor.torque_constant);
+        let resistance = at_least_one(motor.resistance);
+        Self {
+            microamps_per_newton_metre: 1_000_000_000_000 / constant,
+            // 2⁴⁴ / 10¹² = 17.592186.
+            torque_per_microamp: constant * 17_592_186 / 1_000_000,
+            millivolts_per_microamp: (resistance << 30) / 1_000_000,
+            millivolts_per_speed: (constant << 10) / 1_000,
+            // k/R: µN·m/A over mΩ is 10⁻⁶ N·m per mV, times 2²⁴.
+            torque_per_millivolt: (constant << 24) / resistance / 1_000_000,
+            current_limit: motor.current_limit,
+        }
+    }
+
+    /// Returns the torque of a current.
+    pub fn torque(&self, current: Current) -> Torque {
+        let current = i64::from(current.to_microamps());
+        Torque::from_q24(saturate((current * self.torque_per_microamp) >> 20))
+    }
+
+    /// Returns the most torque forward and backward that `supply` drives at `speed`, and that the
+    /// bridge's current limit allows.
+    pub fn reach(&self, supply: Voltage, speed: AngularVelocity) -> (Torque, Torque) {
+        let emf = self.back_emf(speed);
+        let supply = i64::from(supply.to_millivolts()).max(0);
+        let limit = self.torque(self.current_limit);
+        let low = Torque::from_q24(saturate((-supply - emf) * self.torque_per_millivolt));
+        let high = Torque::from_q24(saturate((supply - emf) * self.torque_per_millivolt));
+        (low.bounded(-limit, limit), high.bounded(-limit, limit))
+    }
+
+    /// Returns the duty that lets the motor produce `torque`, from what was measured in the tick
+    /// before.
+    pub fn duty(
+        &self,
+        state: &mut CurrentState,
+        torque: Torque,
+        speed: AngularVelocity,
+        measured: Current,
+        supply: Voltage,
+    ) -> Duty {
+        let error = self.voltage(state.wanted) - self.voltage(measured);
+        if !state.saturated {
+            let integral = state.integral_mv + (error >> INTEGRAL_SHIFT);
+            state.integral_mv = integral.clamp(-INTEGRAL_LIMIT_MV, INTEGRAL_LIMIT_MV);
+        }
+        let wanted = (i64::from(torque.to_q24()) * self.microamps_per_newton_metre) >> 24;
+        state.wanted = Current::from_microamps(saturate(wanted))
+            .bounded(-self.current_limit, self.current_limit);
+        let voltage = self.voltage(state.wanted) + self.back_emf(speed) + state.integral_mv;
+        let supply = i64::from(supply.to_millivolts()).max(SUPPLY_FLOOR_MV);
+        state.saturated = voltage.abs() >= supply;
+        let bounded = voltage.clamp(-supply, supply);
+        Duty::from_q15(((bounded * 32_767) / supply) as i32)
+    }
+
+    fn voltage(&self, current: Current) -> i64 {
+        (i64::from(current.to_microamps()) * self.millivolts_per_microamp) >> 30
+    }
+
+    fn back_emf(&self, speed: AngularVelocity) -> i64 {
+        (i64::from(speed.to_q24()) * self.millivolts_per_speed) >> 34
+    }
+}
+
+const fn at_least_one(value: u32) -> i64 {
+    if value == 0 { 1 } else { value as i64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SUPPLY: Voltage = Voltage::from_millivolts(24_000);
+
+    fn motor() -> Electrical {
+        Electrical::new(&Motor::PROTOTYPE)
+    }
+
+    /// The winding: the current that a duty drives at a speed, with another resistance than set.
+    fn winding(duty: Duty, speed: f64, resistance: f64) -> f64 {
+        let voltage = 24.0 * f64::from(duty.to_q15()) / 32_767.0;
+        (voltage - 1.488 * speed) / resistance
+    }
+
+    #[test]
+    fn drives_the_current_that_the_torque_needs() {
+        let mut state = CurrentState::default();
+        let torque = Torque::from_millinewton_metres(1_488);
+        let speed = AngularVelocity::from_milliradians_per_second(3_000);
+        let duty = motor().duty(&mut state, torque, speed, Current::ZERO, SUPPLY);
+        assert!((winding(duty, 3.0, 5.8) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn learns_a_resistance_that_differs_from_the_settings() {
+        let mut state = CurrentState::default();
+        let torque = Torque::from_millinewton_metres(744);
+        let mut current = 0.0;
+        for _ in 0..200 {
+            let measured = Current::from_microamps((current * 1e6) as i32);
+            let duty = motor().duty(&mut state, torque, AngularVelocity::ZERO, measured, SUPPLY);
+            current = winding(duty, 0.0, 7.0);
+        }
+        assert!((current - 0.5).abs() < 5e-3, "{current}");
+    }
+
+    #[test]
+    fn reaches_less_torque_the_faster_it_turns() {
+        let speed = AngularVelocity::from_milliradians_per_second(15_000);
+        let (low, high) = motor().reach(SUPPLY, speed);
+        let expected = 1.488 * (24.0 - 1.488 * 15.0) / 5.8;
+        assert!((f64::from(high.to_millinewton_metres()) / 1e3 - expected).abs() < 2e-3);
+        assert_eq!(low, -motor().torque(Motor::PROTOTYPE.current_limit));
+    }
+
+    #[test]
+    fn any_measurement_leaves_the_duty_in_range() {
+        let mut state = CurrentState::default();
+        for raw in [i32::MIN, -1, 0, 1, i32::MAX] {
+            for supply in [i32::MIN, 0, 24_000, i32::MAX] {
+                let duty = motor().duty(
+                    &mut state,
+                    Torque::from_q24(raw),
+                    AngularVelocity::from_q24(raw),
+                    Current::from_microamps(raw),
+                    Voltage::from_millivolts(supply),
+                );
+                assert!(duty.abs() <= Duty::FULL);
+            }
+        }
+    }
+}

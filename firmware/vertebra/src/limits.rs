@@ -1,0 +1,146 @@
+//! The chain of limits: which torques each motor may produce now, and what says so.
+
+use eel_kinematics::{Bounds, Side};
+use eel_protocol::LimitCode;
+use eel_units::{Angle, AngularVelocity, Temperature, Torque, Voltage};
+
+use crate::current::Electrical;
+use crate::io::Sample;
+use crate::settings::{Limits, Ramp, Travel};
+
+/// Length of the ramp at the end of a motor's travel: 50 mrad, as a shift from Q29.
+const TRAVEL_RAMP: Angle = Angle::from_milliradians(50);
+/// One in Q15.
+const ONE: i64 = 1 << 15;
+
+/// The bounds of one motor, each with its reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MotorBounds {
+    /// What the torque may be.
+    pub torque: Bounds,
+    low_code: LimitCode,
+    high_code: LimitCode,
+}
+
+impl MotorBounds {
+    /// Starts from a symmetric bound.
+    fn symmetric(bound: Torque, code: LimitCode) -> Self {
+        let bound = bound.abs();
+        Self { torque: Bounds { low: -bound, high: bound }, low_code: code, high_code: code }
+    }
+
+    /// Lowers the upper bound, but not below nothing.
+    fn cap_high(&mut self, high: Torque, code: LimitCode) {
+        let high = high.bounded(Torque::ZERO, Torque::MAX);
+        if high < self.torque.high {
+            self.torque.high = high;
+            self.high_code = code;
+        }
+    }
+
+    /// Raises the lower bound, but not above nothing.
+    fn cap_low(&mut self, low: Torque, code: LimitCode) {
+        let low = low.bounded(Torque::MIN, Torque::ZERO);
+        if low > self.torque.low {
+            self.torque.low = low;
+            self.low_code = code;
+        }
+    }
+
+    fn cap_both(&mut self, bound: Torque, code: LimitCode) {
+        self.cap_high(bound, code);
+        self.cap_low(-bound, code);
+    }
+
+    /// Returns the reason why the torque could not pass a side.
+    pub fn reason(&self, side: Option<Side>) -> LimitCode {
+        match side {
+            None => LimitCode::None,
+            Some(Side::Low) => self.low_code,
+            Some(Side::High) => self.high_code,
+        }
+    }
+}
+
+/// What the bounds of all motors follow from.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a> {
+    /// What was measured.
+    pub sample: &'a Sample,
+    /// Angle of each motor.
+    pub angles: [Angle; 3],
+    /// Speed of each motor.
+    pub speeds: [AngularVelocity; 3],
+    /// What the mode or the stop ramp allows; `None` for no cap.
+    pub command_cap: Option<Torque>,
+}
+
+/// Returns what each motor may produce.
+pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [MotorBounds; 3] {
+    let sample = now.sample;
+    let supply = sample.supply;
+    let low = falling(limits.supply_low.end, limits.supply_low.start, supply);
+    let high = ONE - falling(limits.supply_high.start, limits.supply_high.end, supply);
+    let board = ONE - share(limits.board_hot, sample.board_temperature);
+    core::array::from_fn(|index| {
+        let mut bounds = MotorBounds::symmetric(limits.peak_torque, LimitCode::Peak);
+        if let Some(cap) = now.command_cap {
+            bounds.cap_both(cap.abs(), LimitCode::Command);
+        }
+        let derate = |share: i64| scaled(limits.peak_torque, share);
+        bounds.cap_both(derate(low), LimitCode::Undervoltage);
+        bounds.cap_both(derate(high), LimitCode::Overvoltage);
+        bounds.cap_both(derate(board), LimitCode::Board);
+        let at = |values: &[Temperature; 3]| values.get(index).copied().unwrap_or_default();
+        let hot = ONE - share(limits.motor_hot, at(&sample.motor_temperature));
+        bounds.cap_both(derate(hot), LimitCode::Thermal);
+        let speed = now.speeds.get(index).copied().unwrap_or_default();
+        let (reach_low, reach_high) = motor.reach(supply, speed);
+        bounds.cap_low(reach_low, LimitCode::Speed);
+        bounds.cap_high(reach_high, LimitCode::Speed);
+        let angle = now.angles.get(index).copied().unwrap_or_default();
+        if let Some(travel) = limits.travel.get(index) {
+            cap_travel(&mut bounds, travel, angle, limits.peak_torque);
+        }
+        bounds
+    })
+}
+
+/// Takes away the torque that leads out of the travel, within a ramp before its end.
+fn cap_travel(bounds: &mut MotorBounds, travel: &Travel, angle: Angle, peak: Torque) {
+    let room_above = travel.high - angle;
+    let room_below = angle - travel.low;
+    if room_above < TRAVEL_RAMP {
+        bounds.cap_high(scaled(peak, ramp_share(room_above)), LimitCode::Travel);
+    }
+    if room_below < TRAVEL_RAMP {
+        bounds.cap_low(-scaled(peak, ramp_share(room_below)), LimitCode::Travel);
+    }
+}
+
+/// Returns the share of the travel ramp that is left, Q15.
+fn ramp_share(room: Angle) -> i64 {
+    let room = i64::from(room.to_q29()).max(0);
+    ((room << 15) / i64::from(TRAVEL_RAMP.to_q29())).min(ONE)
+}
+
+/// Returns how far `value` is from `from` (0) to `to` (1), Q15.
+fn falling(from: Voltage, to: Voltage, value: Voltage) -> i64 {
+    fraction(from.to_millivolts(), to.to_millivolts(), value.to_millivolts())
+}
+
+/// Returns how far a temperature is from the start of a ramp (0) to its end (1), Q15.
+fn share(ramp: Ramp<Temperature>, value: Temperature) -> i64 {
+    fraction(ramp.start.to_decidegrees(), ramp.end.to_decidegrees(), value.to_decidegrees())
+}
+
+fn fraction(from: i32, to: i32, value: i32) -> i64 {
+    let span = (i64::from(to) - i64::from(from)).max(1);
+    let part = (i64::from(value) - i64::from(from)).clamp(0, span);
+    (part << 15) / span
+}
+
+/// Multiplies by a share in Q15.
+fn scaled(torque: Torque, share: i64) -> Torque {
+    Torque::from_q24(((i64::from(torque.to_q24()) * share.clamp(0, ONE)) >> 15) as i32)
+}

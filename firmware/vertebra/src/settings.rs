@@ -1,0 +1,173 @@
+//! What a vertebra is told about itself: gains, limits, motors, geometry.
+//!
+//! Settings never change while the drives are on; what changes every tick lives elsewhere.
+
+use eel_kinematics::{Pose, Wrist};
+use eel_protocol::NodeId;
+use eel_units::{Angle, AngularVelocity, Current, Temperature, Torque, Voltage};
+
+/// Everything that is set for one vertebra.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Its place in the chain.
+    pub node: NodeId,
+    /// The unique number of its microcontroller, object 0x1018:4.
+    pub serial: u32,
+    /// Its wrist.
+    pub wrist: Wrist,
+    /// How it answers to deviations.
+    pub gains: Gains,
+    /// What it never exceeds.
+    pub limits: Limits,
+    /// What its motors are.
+    pub motor: Motor,
+}
+
+/// The impedance of the wrist about the base axes x (yaw), y (pitch), z (roll).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gains {
+    /// In mN·m/rad.
+    pub stiffness: [u32; 3],
+    /// In mN·m·s/rad.
+    pub damping: [u32; 3],
+}
+
+/// Bounds that hold whatever the head asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most torque of one motor, both ways.
+    pub peak_torque: Torque,
+    /// Largest yaw, pitch and roll, both ways.
+    pub workspace: Pose,
+    /// Fastest change of yaw, pitch or roll.
+    pub rate: AngularVelocity,
+    /// Travel of each motor: beyond it only torque that leads back.
+    pub travel: [Travel; 3],
+    /// Torque allowed while damped on request.
+    pub damped_torque: Torque,
+    /// Supply below which torque ramps down, and at which it is a fault.
+    pub supply_low: Ramp<Voltage>,
+    /// Supply above which torque ramps down, and at which it is a fault.
+    pub supply_high: Ramp<Voltage>,
+    /// Board temperature above which torque ramps down, and at which it is a fault.
+    pub board_hot: Ramp<Temperature>,
+    /// Motor housing temperature above which torque ramps down, and at which it is a fault.
+    pub motor_hot: Ramp<Temperature>,
+}
+
+/// The angles between which a motor may drive freely.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Travel {
+    /// The low end.
+    pub low: Angle,
+    /// The high end.
+    pub high: Angle,
+}
+
+/// Where a derating starts and where nothing is left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ramp<T> {
+    /// Full torque up to here.
+    pub start: T,
+    /// No torque, and a fault, from here.
+    pub end: T,
+}
+
+/// The constants of a motor with its gear, seen from the crank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motor {
+    /// Torque per current, µN·m/A, which is also the back-EMF in µV·s/rad.
+    pub torque_constant: u32,
+    /// Resistance of winding and bridge in mΩ.
+    pub resistance: u32,
+    /// Quadrature counts per turn of the crank.
+    pub counts_per_turn: u32,
+    /// Most current of the bridge.
+    pub current_limit: Current,
+    /// Fastest believable speed of the crank.
+    pub speed_limit: AngularVelocity,
+}
+
+impl Settings {
+    /// Returns the settings of the prototype for the vertebra `node` with the board `serial`.
+    pub const fn prototype(node: NodeId, serial: u32) -> Self {
+        Self {
+            node,
+            serial,
+            wrist: Wrist::PAPER,
+            gains: Gains::PROTOTYPE,
+            limits: Limits::PROTOTYPE,
+            motor: Motor::PROTOTYPE,
+        }
+    }
+
+    /// Tells whether the settings contradict neither themselves nor physics.
+    pub fn are_sound(&self) -> bool {
+        let Limits { workspace, travel, supply_low, supply_high, .. } = &self.limits;
+        let positive = [workspace.yaw, workspace.pitch, workspace.roll]
+            .into_iter()
+            .all(|range| range > Angle::ZERO && range < Angle::FRAC_PI_2);
+        positive
+            && travel.iter().all(|travel| travel.low < travel.high)
+            && self.limits.peak_torque > Torque::ZERO
+            && supply_low.end < supply_low.start
+            && supply_low.start < supply_high.start
+            && supply_high.start < supply_high.end
+            && self.motor.torque_constant > 0
+            && self.motor.resistance > 0
+            && self.motor.counts_per_turn > 0
+    }
+}
+
+impl Gains {
+    /// The prototype's: stiff enough for a tenth of a degree of error per 0.2 N·m.
+    pub const PROTOTYPE: Self =
+        Self { stiffness: [120_000, 120_000, 80_000], damping: [4_000, 4_000, 2_000] };
+}
+
+impl Limits {
+    /// The prototype's: the workspace of the paper, ±30°, ±15°, ±4°.
+    pub const PROTOTYPE: Self = Self {
+        peak_torque: Torque::from_millinewton_metres(3_000),
+        workspace: Pose {
+            yaw: Angle::from_tenth_milliradians(5_236),
+            pitch: Angle::from_tenth_milliradians(2_618),
+            roll: Angle::from_tenth_milliradians(698),
+        },
+        rate: AngularVelocity::from_milliradians_per_second(6_000),
+        travel: [
+            Travel { low: Angle::from_milliradians(-900), high: Angle::from_milliradians(900) },
+            Travel { low: Angle::from_milliradians(-900), high: Angle::from_milliradians(900) },
+            Travel { low: Angle::from_milliradians(520), high: Angle::from_milliradians(1_050) },
+        ],
+        damped_torque: Torque::from_millinewton_metres(1_000),
+        supply_low: Ramp {
+            start: Voltage::from_millivolts(20_000),
+            end: Voltage::from_millivolts(17_000),
+        },
+        supply_high: Ramp {
+            start: Voltage::from_millivolts(28_000),
+            end: Voltage::from_millivolts(31_000),
+        },
+        board_hot: Ramp {
+            start: Temperature::from_decidegrees(750),
+            end: Temperature::from_decidegrees(900),
+        },
+        motor_hot: Ramp {
+            start: Temperature::from_decidegrees(800),
+            end: Temperature::from_decidegrees(1_000),
+        },
+    };
+}
+
+impl Motor {
+    /// A 24 V brushed motor of the 26 mm class: 34.6 mN·m/A, 5.8 Ω, gear 43:1, 2048 counts a turn
+    /// of its shaft.
+    pub const PROTOTYPE: Self = Self {
+        torque_constant: 1_488_000,
+        resistance: 5_800,
+        counts_per_turn: 88_064,
+        current_limit: Current::from_milliamps(2_500),
+        speed_limit: AngularVelocity::from_milliradians_per_second(40_000),
+    };
+}
