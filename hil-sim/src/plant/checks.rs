@@ -1,0 +1,451 @@
+//! Numeric checks of the plant against answers that do not come from it; each gives a figure and
+//! the bound it must keep, for a test and for `hil-sim check` to print.
+
+use std::f64::consts::PI;
+
+use eel_vertebra::Drive;
+
+use super::Plant;
+use super::algebra::{Quat, Vec3};
+use super::body::{JOINTS, perimeter};
+use super::chain::Push;
+use super::config::{Ballast, Config, Shape};
+use super::gait::Wave;
+use super::joint::Tracking;
+use super::measures::{Figures, Moment, Recording, Stroke, swim_figures};
+use super::random::Random;
+
+/// One check and its outcome.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Check {
+    /// The check's number and what it looks at.
+    pub name: &'static str,
+    /// What came out.
+    pub figure: f64,
+    /// What may come out at most.
+    pub bound: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// Whether the figure keeps the bound.
+    pub passed: bool,
+}
+
+impl Check {
+    /// Judges a figure; one that is not a number fails.
+    fn new(name: &'static str, figure: f64, bound: f64, unit: &'static str) -> Self {
+        let passed = figure <= bound;
+        Self {
+            name,
+            figure,
+            bound,
+            unit,
+            passed,
+        }
+    }
+}
+
+/// Runs all checks.
+pub fn all() -> Vec<Check> {
+    vec![p1(), p3(), p4(), p6(), p7(), p8(), p9(), p10()]
+}
+
+/// P1: the dry free chain keeps its energy over 5 s (Runge–Kutta, 1 ms).
+pub fn p1() -> Check {
+    let config = Config {
+        step_s: 1e-3,
+        water: None,
+        gravity_m_s2: 0.0,
+        ..Config::default()
+    };
+    let mut plant = Plant::new(&config, 1);
+    shake(&mut plant, 1);
+    let start = plant.kinetic_energy_j();
+    let mut drift: f64 = 0.0;
+    for _ in 0..5000 {
+        plant.step_free(0.0);
+        drift = drift.max((plant.kinetic_energy_j() - start).abs() / start);
+    }
+    Check::new(
+        "P1 energy drift of the dry free chain over 5 s",
+        drift,
+        1e-6,
+        "1",
+    )
+}
+
+/// Bends the eel a little and gives every joint and the head a rate.
+fn shake(plant: &mut Plant, seed: u64) {
+    let mut random = Random::new(seed, 0);
+    let mut draw = |reach: f64| f64::from(random.within(1000)) * 1e-3 * reach;
+    let state = plant.state_mut();
+    for joint in 0..JOINTS {
+        state.joints[joint] = Quat::from_pose([draw(0.3), draw(0.1), draw(0.03)]);
+        state.rates[joint] = Vec3::new(draw(1.0), draw(0.5), draw(0.2));
+    }
+    state.spin = Vec3::new(draw(0.5), draw(0.5), draw(0.5));
+    state.velocity = Vec3::new(draw(0.3), draw(0.3), draw(0.3));
+}
+
+/// P3: a locked eel answers a sudden force with a = F/(m + mₐ), mₐ from the integrals of ρπb²
+/// (lateral), ρπa² (vertical) and nothing (along the body), done by hand for the default outline.
+pub fn p3() -> Check {
+    let shape = Shape::default();
+    let (nose, trunk, tail) = (
+        shape.nose_m,
+        shape.length_m - shape.nose_m - shape.tail_m,
+        shape.tail_m,
+    );
+    // ∫ over the nose of 1 − (1 − x)² is 2/3; over the tail, of (p + (q − p) x)², (p² + pq + q²)/3.
+    let added = |p: f64, q: f64| {
+        1000.0 * PI * (p * p * (2.0 / 3.0 * nose + trunk) + (p * p + p * q + q * q) / 3.0 * tail)
+    };
+    let lateral = added(shape.vertical_m, shape.edge_vertical_m);
+    let vertical = added(shape.lateral_m, shape.edge_lateral_m);
+    let mass = Plant::new(&Config::default(), 1).mass_kg();
+    let axes = [
+        (Vec3::new(1.0, 0.0, 0.0), mass + vertical),
+        (Vec3::new(0.0, 1.0, 0.0), mass + lateral),
+        (Vec3::new(0.0, 0.0, 1.0), mass),
+    ];
+    let error = |(axis, inertia): (Vec3, f64)| {
+        let acceleration = sudden(axis, 2.0);
+        (acceleration * inertia / 2.0 - 1.0).abs()
+    };
+    let worst = axes.map(error).into_iter().fold(0.0, f64::max);
+    Check::new(
+        "P3 error of F/(m + ma) of the locked eel, three axes",
+        worst,
+        1e-6,
+        "1",
+    )
+}
+
+/// Returns the acceleration along an axis that a force gives a locked eel at rest, m/s²; the force
+/// acts where it turns nothing.
+fn sudden(axis: Vec3, force_n: f64) -> f64 {
+    let config = Config {
+        locked: true,
+        step_s: 1e-4,
+        ..Config::default()
+    };
+    let answer = |z: f64| {
+        let mut plant = Plant::new(&config, 1);
+        plant.set_pushes(&[Push {
+            body: 0,
+            point: Vec3::new(0.0, 0.0, z),
+            force: axis * force_n,
+        }]);
+        plant.step(&[[Drive::Off; 3]; JOINTS]);
+        let state = plant.state();
+        let turn = state.spin.0[0].abs() + state.spin.0[1].abs();
+        (state.velocity.dot(axis) / config.step_s, turn, state.spin)
+    };
+    // The turn is linear in the lever: two tries give the lever that turns nothing.
+    let (at_zero, at_one) = (answer(0.0), answer(1.0));
+    let change = at_one.2 - at_zero.2;
+    let z = if change.norm() > 0.0 {
+        -at_zero.2.dot(change) / change.dot(change)
+    } else {
+        0.0
+    };
+    answer(z).0
+}
+
+/// P4: a locked eel glides straight as U₀/(1 + k U₀ t), k from the wetted surface by a fine sum.
+pub fn p4() -> Check {
+    let config = Config {
+        locked: true,
+        ..Config::default()
+    };
+    let mut plant = Plant::new(&config, 1);
+    let start = 1.0;
+    plant.state_mut().velocity = Vec3::new(0.0, 0.0, -start);
+    let slices = 30_000;
+    let h = config.shape.length_m / f64::from(slices);
+    let wetted: f64 = (0..slices)
+        .map(|i| config.shape.half_axes((f64::from(i) + 0.5) * h))
+        .map(|(a, b)| perimeter(a, b) * h)
+        .sum();
+    let k = 0.5 * 1000.0 * 0.008 * wetted / plant.mass_kg();
+    let mut worst: f64 = 0.0;
+    for _ in 0..20_000 {
+        plant.step(&[[Drive::Off; 3]; JOINTS]);
+        let expected = start / (1.0 + k * start * plant.time_s());
+        worst = worst.max((-plant.state().velocity.0[2] / expected - 1.0).abs());
+    }
+    Check::new("P4 error of the straight glide over 10 s", worst, 5e-3, "1")
+}
+
+/// P6: what the joints put in is what the water takes and the motion keeps, over a swim.
+pub fn p6() -> Check {
+    let (wave, tracking) = (
+        Wave::default(),
+        Tracking {
+            inertia: 0.0,
+            ..Tracking::default()
+        },
+    );
+    let config = Config::default();
+    let mut plant = Plant::new(&config, 1);
+    let mut taken = 0.0;
+    for _ in 0..12_000 {
+        let targets = wave.targets(&config.shape, plant.time_s() + config.step_s);
+        let before = plant.water_power_w();
+        plant.step_tracking(&targets, &tracking);
+        taken += 0.5 * (before + plant.water_power_w()) * config.step_s;
+    }
+    let put_in = plant.joint_energy_j();
+    let error = (put_in - taken - plant.kinetic_energy_j()).abs() / put_in;
+    Check::new("P6 energy balance of a swim of 6 s", error, 0.02, "1")
+}
+
+/// P7: halving the step and doubling the strips leaves the speed of the default swim.
+pub fn p7() -> Check {
+    let config = Config::default();
+    let fine = Config {
+        step_s: 0.25e-3,
+        strips_per_body: 10,
+        ..Config::default()
+    };
+    let speed = |config: &Config| {
+        reference_swim(config, &Wave::default(), 9.0)
+            .map_or(f64::NAN, |swim| swim.figures.speed_m_s)
+    };
+    let change = (speed(&fine) / speed(&config) - 1.0).abs();
+    Check::new(
+        "P7 change of speed with half the step, twice the strips",
+        change,
+        5e-3,
+        "1",
+    )
+}
+
+/// P8: the mirrored gait swims the mirrored path.
+pub fn p8() -> Check {
+    let path = |amplitude: f64| {
+        let wave = Wave {
+            amplitude_lengths: amplitude,
+            ..Wave::default()
+        };
+        let mut plant = Plant::new(&Config::default(), 1);
+        let mut points = Vec::new();
+        for step in 0..8000 {
+            let targets = wave.targets(
+                &plant.config().shape,
+                plant.time_s() + plant.config().step_s,
+            );
+            plant.step_tracking(&targets, &Tracking::default());
+            if step % 100 == 0 {
+                points.extend(plant.spine_points());
+            }
+        }
+        points
+    };
+    let off = |(a, b): ([f64; 3], [f64; 3])| {
+        (a[0] - b[0])
+            .abs()
+            .max((a[1] + b[1]).abs())
+            .max((a[2] - b[2]).abs())
+    };
+    let worst = path(0.08)
+        .into_iter()
+        .zip(path(-0.08))
+        .map(off)
+        .fold(0.0, f64::max);
+    Check::new(
+        "P8 gap between the mirrored gait's path and the mirrored path",
+        worst,
+        1e-9,
+        "m",
+    )
+}
+
+/// P9: an eel at rest stays at rest for 60 s, bridges off, then shorted, then at zero duty.
+pub fn p9() -> Check {
+    let config = Config::default();
+    let mut plant = Plant::new(&config, 1);
+    let start = plant.spine_points();
+    let counts: Vec<_> = (0..JOINTS)
+        .map(|joint| plant.sample(joint).encoder_counts)
+        .collect();
+    let zero = Drive::Duty(eel_units::Duty::ZERO);
+    let mut worst: f64 = 0.0;
+    for step in 0..120_000 {
+        let drive = [Drive::Off, Drive::Brake, zero][step / 40_000];
+        plant.step(&[[drive; 3]; JOINTS]);
+        if step % 1000 == 0 {
+            for (now, then) in plant.spine_points().iter().zip(&start) {
+                worst = now
+                    .iter()
+                    .zip(then)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(worst, f64::max);
+            }
+        }
+    }
+    for (joint, counts) in counts.iter().enumerate() {
+        if plant.sample(joint).encoder_counts != *counts {
+            worst = f64::INFINITY;
+        }
+    }
+    Check::new("P9 way of the eel at rest over 60 s", worst, 0.0, "m")
+}
+
+/// P10: a ballast of 0.5 kg pulls the eel down with 4.905 N.
+pub fn p10() -> Check {
+    let ballast = Ballast {
+        mass_kg: 0.5,
+        body: 5,
+        position_m: [-0.03, 0.0, 0.05],
+    };
+    let config = Config {
+        ballast: Some(ballast),
+        ..Config::default()
+    };
+    let mut plant = Plant::new(&config, 1);
+    plant.step(&[[Drive::Off; 3]; JOINTS]);
+    let force = plant.momentum()[0] / plant.time_s();
+    Check::new(
+        "P10 error of the weight of 0.5 kg of ballast",
+        (force + 4.905).abs(),
+        1e-3,
+        "N",
+    )
+}
+
+/// What a swim with ideal drives came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swim {
+    /// Its figures.
+    pub figures: Figures,
+    /// Largest yaw of a joint, rad.
+    pub peak_yaw_rad: f64,
+    /// Largest moment of a joint over the last six cycles, N·m.
+    pub peak_moment_nm: f64,
+    /// Largest difference between a joint's yaw and its target, rad.
+    pub tracking_error_rad: f64,
+}
+
+/// Swims the reference gait with ideal drives for a number of cycles; `None` when that is too
+/// short for figures.
+pub fn reference_swim(config: &Config, wave: &Wave, cycles: f64) -> Option<Swim> {
+    let mut plant = Plant::new(config, 1);
+    let steps = (cycles / (wave.frequency_hz * config.step_s)) as usize;
+    let every = (0.005 / config.step_s) as usize;
+    let (mut peak_yaw, mut peak_moment, mut error): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let mut recording = Recording {
+        interval_s: every as f64 * config.step_s,
+        moments: Vec::new(),
+    };
+    for step in 0..=steps {
+        if step % every == 0 {
+            recording.moments.push(Moment {
+                centre: plant.centre_of_mass(),
+                tail: plant.tail_edge(),
+                energy_j: plant.joint_energy_j(),
+            });
+        }
+        let targets = wave.targets(&config.shape, plant.time_s() + config.step_s);
+        plant.step_tracking(&targets, &Tracking::default());
+        let settled = plant.time_s() * wave.frequency_hz > cycles - 6.0;
+        for (joint, target) in targets.iter().enumerate() {
+            let yaw = plant.joint_pose(joint)[0];
+            peak_yaw = peak_yaw.max(yaw.abs());
+            error = error.max((yaw - target.pose[0]).abs());
+            if settled {
+                peak_moment = peak_moment.max(Vec3(plant.joint_moment(joint)).norm());
+            }
+        }
+    }
+    let stroke = Stroke {
+        frequency_hz: wave.frequency_hz,
+        wavelength_m: wave.wavelength_lengths * config.shape.length_m,
+        length_m: config.shape.length_m,
+    };
+    let figures = swim_figures(&recording, &stroke)?;
+    Some(Swim {
+        figures,
+        peak_yaw_rad: peak_yaw,
+        peak_moment_nm: peak_moment,
+        tracking_error_rad: error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Prints a check and demands that it passes.
+    fn demand(check: &Check) {
+        println!("{check:?}");
+        assert!(check.passed, "{check:?}");
+    }
+
+    #[test]
+    fn the_dry_free_chain_keeps_its_energy() {
+        demand(&p1());
+    }
+
+    #[test]
+    fn a_sudden_force_meets_mass_and_added_mass() {
+        demand(&p3());
+    }
+
+    #[test]
+    fn a_straight_glide_slows_as_the_formula_says() {
+        demand(&p4());
+    }
+
+    #[test]
+    fn the_energy_of_a_swim_adds_up() {
+        demand(&p6());
+    }
+
+    #[test]
+    fn step_and_strips_are_fine_enough() {
+        demand(&p7());
+    }
+
+    #[test]
+    fn a_mirrored_gait_swims_the_mirrored_path() {
+        demand(&p8());
+    }
+
+    #[test]
+    fn an_eel_at_rest_stays_at_rest() {
+        demand(&p9());
+    }
+
+    #[test]
+    fn a_ballast_weighs_what_it_weighs() {
+        demand(&p10());
+    }
+
+    #[test]
+    fn the_default_swim_is_an_eels() {
+        let swim = reference_swim(&Config::default(), &Wave::default(), 20.0).unwrap();
+        println!("{swim:#?}");
+        let figures = &swim.figures;
+        // Kern & Koumoutsakos; Borazjani & Sotiropoulos; Carling et al.
+        assert!((0.26..=0.55).contains(&figures.stride_body_lengths));
+        assert!((0.30..=0.50).contains(&figures.strouhal));
+        assert!((0.45..=0.77).contains(&figures.slip));
+        assert!(figures.unsteadiness < 0.02);
+        assert!(swim.tracking_error_rad < 0.005);
+    }
+
+    #[test]
+    fn the_default_swim_agrees_with_the_prototype() {
+        let swim = reference_swim(&Config::default(), &Wave::default(), 20.0).unwrap();
+        let near = |found: f64, expected: f64, half_digit: f64| {
+            assert!((found - expected).abs() <= half_digit, "{found} {expected}");
+        };
+        near(swim.figures.speed_m_s, 0.66, 0.005);
+        near(swim.figures.stride_body_lengths, 0.44, 0.005);
+        near(swim.figures.slip, 0.55, 0.005);
+        near(swim.figures.strouhal, 0.40, 0.005);
+        near(swim.figures.mean_power_w, 2.0, 0.05);
+        near(swim.peak_moment_nm, 2.1, 0.05);
+        near(swim.peak_yaw_rad.to_degrees(), 26.6, 0.05);
+    }
+}
