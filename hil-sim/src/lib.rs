@@ -1,2 +1,4 @@
-//! In the making.
+//! Ten simulated vertebrae, their bus and the eel in water.
+
+pub mod bus;
 pub mod plant;
