@@ -78,7 +78,6 @@ impl Impedance {
 /// Multiplies gains and deviations axis by axis and brings the products to Q24 N·m.
 fn product(gains: [i64; 3], values: [i32; 3], scale: impl Fn(i64) -> i64) -> [Torque; 3] {
     let axis = |gain: i64, value: i32| {
-        let limit = i64::from(i32::MAX);
         Torque::from_q24(saturate(scale(gain.saturating_mul(i64::from(value)))))
     };
     [axis(gains[0], values[0]), axis(gains[1], values[1]), axis(gains[2], values[2])]

@@ -13,6 +13,8 @@ pub struct Settings {
     pub node: NodeId,
     /// The unique number of its microcontroller, object 0x1018:4.
     pub serial: u32,
+    /// What its board calls itself, object 0x1009.
+    pub hardware: &'static str,
     /// Its wrist.
     pub wrist: Wrist,
     /// How it answers to deviations.
@@ -94,6 +96,7 @@ impl Settings {
         Self {
             node,
             serial,
+            hardware: "prototype",
             wrist: Wrist::PAPER,
             gains: Gains::PROTOTYPE,
             limits: Limits::PROTOTYPE,

@@ -4,7 +4,7 @@ use eel_canopen::{Config, Frame, Identity, NmtCommand, NmtState, Node};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
 use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status};
-use eel_protocol::{VERTEBRA_HEARTBEAT_MS, device, pdo};
+use eel_protocol::{SYNC_COUNTER_OVERFLOW, VERTEBRA_HEARTBEAT_MS, identity, pdo};
 use eel_units::{Angle, Duration, Instant};
 
 use crate::core::Core;
@@ -160,19 +160,19 @@ fn config(settings: &Settings) -> Config {
     Config {
         node_id: settings.node.get(),
         identity: Identity {
-            vendor: device::VENDOR,
-            product: device::PRODUCT,
-            revision: device::REVISION,
+            vendor: identity::VENDOR,
+            product: identity::PRODUCT,
+            revision: identity::REVISION,
             serial: settings.serial,
         },
-        device_type: device::TYPE,
-        device_name: device::NAME,
-        hardware_version: device::HARDWARE_VERSION,
-        software_version: device::SOFTWARE_VERSION,
+        device_type: identity::DEVICE_TYPE,
+        device_name: identity::DEVICE_NAME,
+        hardware_version: settings.hardware,
+        software_version: identity::SOFTWARE_VERSION,
         heartbeat_ms: VERTEBRA_HEARTBEAT_MS,
         consumer: Some((HEAD_NODE, HEAD_HEARTBEAT_TIMEOUT_MS)),
         sync_cob_id: 0x080,
-        sync_counter_overflow: 0,
+        sync_counter_overflow: SYNC_COUNTER_OVERFLOW,
         rpdos: pdo::RPDOS,
         tpdos: pdo::TPDOS,
     }

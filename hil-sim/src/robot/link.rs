@@ -1,0 +1,88 @@
+//! Between a CAN controller and the program: the queues that interrupts fill and empty.
+
+use std::collections::VecDeque;
+
+use eel_protocol::Frame;
+
+use crate::bus::{Bus, ControllerConfig, ControllerId};
+
+/// Frames that a program's queue holds, each way.
+const DEPTH: usize = 32;
+
+/// One program's end of the bus.
+#[derive(Debug)]
+pub struct Link {
+    controller: ControllerId,
+    received: Vec<Frame>,
+    waiting: VecDeque<Frame>,
+    overruns: u64,
+    dropped: u64,
+}
+
+impl Link {
+    /// Attaches a controller to the bus.
+    ///
+    /// # Errors
+    /// Where the bus or the hardware has no room.
+    pub fn attach(bus: &mut Bus, config: ControllerConfig) -> anyhow::Result<Self> {
+        let controller = bus
+            .attach(config)
+            .map_err(|error| anyhow::anyhow!("controller not attached: {error:?}"))?;
+        Ok(Self {
+            controller,
+            received: Vec::with_capacity(DEPTH),
+            waiting: VecDeque::with_capacity(DEPTH),
+            overruns: 0,
+            dropped: 0,
+        })
+    }
+
+    /// Serves the controller: takes what came, and loads what waits into free buffers.
+    pub fn serve(&mut self, bus: &mut Bus, now_ns: u64) {
+        if bus.has_received(self.controller) {
+            while let Some((_, frame)) = bus.receive(self.controller) {
+                if self.received.len() < DEPTH {
+                    self.received.push(frame);
+                } else {
+                    self.overruns += 1;
+                }
+            }
+        }
+        while let Some(frame) = self.waiting.front() {
+            if bus.enqueue(now_ns, self.controller, *frame).is_err() {
+                break;
+            }
+            self.waiting.pop_front();
+        }
+    }
+
+    /// Sends a frame: at once where a buffer is free and nothing waits, later otherwise.
+    pub fn send(&mut self, bus: &mut Bus, now_ns: u64, frame: Frame) {
+        if self.waiting.len() >= DEPTH {
+            self.dropped += 1;
+            return;
+        }
+        self.waiting.push_back(frame);
+        self.serve(bus, now_ns);
+    }
+
+    /// Takes what was received since the last call.
+    pub fn received(&mut self) -> Vec<Frame> {
+        std::mem::take(&mut self.received)
+    }
+
+    /// Switches the controller; off, everything that waits is gone.
+    pub fn power(&mut self, bus: &mut Bus, now_ns: u64, on: bool) {
+        bus.set_powered(now_ns, self.controller, on);
+        self.received.clear();
+        self.waiting.clear();
+    }
+
+    /// Returns how many frames were lost here.
+    pub fn lost(&self, bus: &Bus) -> u64 {
+        let hardware = bus
+            .controller(self.controller)
+            .map_or(0, |counters| counters.overruns.iter().map(|count| u64::from(*count)).sum());
+        hardware + self.overruns + self.dropped
+    }
+}

@@ -1,0 +1,303 @@
+//! Ten vertebrae, their head, the bus between them and the eel around them, in simulated time.
+//!
+//! One integer clock in nanoseconds orders everything: the frames on the bus, the plant's steps
+//! every half millisecond, the head's and each vertebra's tick every millisecond. The ticks of the
+//! nodes do not coincide, as those of real boards do not. A vertebra here is `eel-vertebra` itself
+//! behind [`Node`]; nothing of its logic is written a second time.
+
+mod clock;
+mod fault;
+mod link;
+mod node;
+
+use eel_head::{Config as HeadConfig, Event as HeadEvent, Head};
+use eel_protocol::{Cob, HEAD_NODE, NodeId, VERTEBRAE};
+use eel_units::Instant;
+use eel_vertebra::{Drive, Sample};
+
+use crate::bus::{
+    BitRate, Bus, ControllerConfig, Event as BusEvent, Fifo, Filter, FilterMatch, Statistics,
+};
+use crate::plant::{Config as PlantConfig, Plant};
+
+pub use clock::{PLANT_STEP_NS, TICK_NS};
+pub use fault::{Fault, FaultKind};
+pub use link::Link;
+pub use node::{NativeNode, Node, Turn};
+
+use clock::{Happening, Schedule};
+
+/// Vertebrae of the eel.
+pub const NODES: usize = VERTEBRAE as usize;
+
+/// How a robot is put together.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// What the head does.
+    pub head: HeadConfig,
+    /// The eel and the water.
+    pub plant: PlantConfig,
+    /// Where encoders start, noise of the sensors.
+    pub seed: u64,
+    /// What goes wrong, in the order of time.
+    pub faults: Vec<Fault>,
+    /// Bits a second on the bus.
+    pub bitrate: u32,
+}
+
+impl Config {
+    /// Returns a robot without faults at 1 Mbit/s.
+    pub fn new(head: HeadConfig, seed: u64) -> Self {
+        let plant = PlantConfig::default();
+        Self { head, plant, seed, faults: Vec::new(), bitrate: 1_000_000 }
+    }
+}
+
+/// What happens while time passes.
+pub trait Observer {
+    /// Sees a frame or an error on the bus.
+    fn bus(&mut self, event: &BusEvent);
+    /// Sees the turn of a vertebra that has just ended.
+    fn turn(&mut self, id: NodeId, node: &dyn Node, turn: &Turn<'_>, plant: &Plant);
+    /// Hears the head.
+    fn head(&mut self, now: Instant, event: HeadEvent);
+}
+
+/// The whole robot.
+pub struct Robot {
+    now_ns: u64,
+    schedule: Schedule,
+    bus: Bus,
+    plant: Plant,
+    head: Head,
+    head_link: Link,
+    head_silent: bool,
+    nodes: Vec<Seat>,
+    faults: Vec<Fault>,
+}
+
+/// A vertebra's place on the bus and in the body.
+struct Seat {
+    id: NodeId,
+    node: Box<dyn Node>,
+    link: Link,
+    drives: [Drive; 3],
+}
+
+impl Robot {
+    /// Puts a robot of native vertebrae together.
+    ///
+    /// # Errors
+    /// A bit rate that the bus can't have.
+    pub fn new(config: &Config) -> anyhow::Result<Self> {
+        Self::with_nodes(config, |id| Box::new(NativeNode::new(id)))
+    }
+
+    /// Puts a robot together of the nodes that `make` returns.
+    ///
+    /// # Errors
+    /// A bit rate that the bus can't have.
+    pub fn with_nodes(
+        config: &Config,
+        mut make: impl FnMut(NodeId) -> Box<dyn Node>,
+    ) -> anyhow::Result<Self> {
+        let rate = BitRate::new(config.bitrate)
+            .ok_or_else(|| anyhow::anyhow!("no bus runs at {} bit/s", config.bitrate))?;
+        let mut bus = Bus::new(rate);
+        let head_link = Link::attach(&mut bus, head_controller())?;
+        let mut nodes = Vec::with_capacity(NODES);
+        for id in NodeId::all() {
+            let link = Link::attach(&mut bus, vertebra_controller(id))?;
+            nodes.push(Seat { id, node: make(id), link, drives: [Drive::Off; 3] });
+        }
+        let mut faults = config.faults.clone();
+        faults.sort_by_key(|fault| fault.at_ns);
+        Ok(Self {
+            now_ns: 0,
+            schedule: Schedule::new(),
+            bus,
+            plant: Plant::new(&config.plant, config.seed),
+            head: Head::new(config.head, Instant::ZERO),
+            head_link,
+            head_silent: false,
+            nodes,
+            faults,
+        })
+    }
+
+    /// Lets time pass up to `to_ns`.
+    pub fn run(&mut self, to_ns: u64, observer: &mut impl Observer) {
+        while self.schedule.next_ns() <= to_ns {
+            let (at_ns, happening) = self.schedule.take();
+            self.advance_bus(at_ns, observer);
+            self.now_ns = at_ns;
+            match happening {
+                Happening::Plant => self.step_plant(),
+                Happening::Head => self.tick_head(observer),
+                Happening::Node(index) => self.tick_node(index, observer),
+            }
+        }
+        self.advance_bus(to_ns, observer);
+        self.now_ns = to_ns;
+    }
+
+    /// Returns the time in ns.
+    pub const fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Returns the plant.
+    pub const fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Returns the head.
+    pub const fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Tells the head to end the gait and switch off.
+    pub fn stop(&mut self) {
+        self.head.stop(instant(self.now_ns));
+    }
+
+    /// Returns a vertebra.
+    pub fn node(&self, id: NodeId) -> &dyn Node {
+        self.nodes[id.index()].node.as_ref()
+    }
+
+    /// Returns the drives of a vertebra since its last turn.
+    pub fn drives(&self, id: NodeId) -> [Drive; 3] {
+        self.nodes[id.index()].drives
+    }
+
+    /// Returns the counters of the bus.
+    pub const fn bus_statistics(&self) -> &Statistics {
+        self.bus.statistics()
+    }
+
+    /// Returns the share of the time in which the bus was busy, 0–1.
+    pub fn bus_load(&self) -> f64 {
+        self.bus.load()
+    }
+
+    /// Returns how many frames were lost anywhere: in full receive FIFOs and full queues.
+    pub fn frames_lost(&self) -> u64 {
+        let links = self.nodes.iter().map(|seat| &seat.link).chain([&self.head_link]);
+        links.map(|link| link.lost(&self.bus)).sum::<u64>() + u64::from(self.head.dropped())
+    }
+
+    /// Lets frames end up to `to_ns`; after each, the controllers are served as by interrupt.
+    fn advance_bus(&mut self, to_ns: u64, observer: &mut impl Observer) {
+        while let Some(end_ns) = self.bus.next_event_ns()
+            && end_ns <= to_ns
+        {
+            self.bus.advance(end_ns, &mut |event| observer.bus(event));
+            self.head_link.serve(&mut self.bus, end_ns);
+            for seat in &mut self.nodes {
+                seat.link.serve(&mut self.bus, end_ns);
+            }
+        }
+        self.bus.advance(to_ns, &mut |event| observer.bus(event));
+    }
+
+    fn step_plant(&mut self) {
+        let mut drives = [[Drive::Off; 3]; NODES];
+        for (drives, seat) in drives.iter_mut().zip(&self.nodes) {
+            *drives = seat.drives;
+        }
+        self.plant.step(&drives);
+    }
+
+    fn tick_head(&mut self, observer: &mut impl Observer) {
+        self.apply_faults();
+        if self.head_silent {
+            return;
+        }
+        let now = instant(self.now_ns);
+        for frame in self.head_link.received() {
+            self.head.handle_frame(now, &frame);
+        }
+        self.head.tick(now);
+        while let Some(frame) = self.head.poll_transmit() {
+            self.head_link.send(&mut self.bus, self.now_ns, frame);
+        }
+        while let Some(event) = self.head.poll_event() {
+            observer.head(now, event);
+        }
+    }
+
+    fn tick_node(&mut self, index: usize, observer: &mut impl Observer) {
+        let now = instant(self.now_ns);
+        let sample: Sample = self.plant.sample(index);
+        let seat = &mut self.nodes[index];
+        let frames = seat.link.received();
+        let mut sent = Vec::new();
+        seat.drives = seat.node.turn(now, &frames, &sample, &mut sent);
+        for frame in &sent {
+            seat.link.send(&mut self.bus, self.now_ns, *frame);
+        }
+        let turn =
+            Turn { now, frames: &frames, sample: &sample, sent: &sent, drives: seat.drives };
+        observer.turn(seat.id, seat.node.as_ref(), &turn, &self.plant);
+    }
+
+    /// Lets happen what is due to go wrong.
+    fn apply_faults(&mut self) {
+        while self.faults.first().is_some_and(|fault| fault.at_ns <= self.now_ns) {
+            let fault = self.faults.remove(0);
+            match fault.kind {
+                FaultKind::HeadSilent => {
+                    self.head_silent = true;
+                    self.head_link.power(&mut self.bus, self.now_ns, false);
+                }
+                FaultKind::NodeReset(id) => {
+                    let seat = &mut self.nodes[id.index()];
+                    seat.link.power(&mut self.bus, self.now_ns, false);
+                    seat.link.power(&mut self.bus, self.now_ns, true);
+                    seat.node.reset(instant(self.now_ns));
+                    seat.drives = [Drive::Off; 3];
+                }
+            }
+        }
+    }
+}
+
+/// Returns the local clock's reading.
+fn instant(now_ns: u64) -> Instant {
+    Instant::from_micros(now_ns / 1_000)
+}
+
+/// The head listens to what the vertebrae say, not to other clients' SDOs.
+fn head_controller() -> ControllerConfig {
+    let every = |cob: Cob| Filter {
+        extended: false,
+        matches: FilterMatch::Range(u32::from(cob.id()) + 1, u32::from(cob.id()) + 0x7F),
+        store: Some(Fifo::Zero),
+    };
+    ControllerConfig {
+        filters: vec![every(Cob::Emergency(0)), every(Cob::Pose(0)), every(Cob::Heartbeat(0))],
+        otherwise: None,
+        ..ControllerConfig::default()
+    }
+}
+
+/// A vertebra listens to what is for it, as the board's acceptance filters do.
+fn vertebra_controller(id: NodeId) -> ControllerConfig {
+    let one = |cob: Cob| u32::from(cob.id());
+    let node = id.get();
+    let dual = |a: Cob, b: Cob| Filter {
+        extended: false,
+        matches: FilterMatch::Dual(one(a), one(b)),
+        store: Some(Fifo::Zero),
+    };
+    ControllerConfig {
+        filters: vec![
+            dual(Cob::Nmt, Cob::Sync),
+            dual(Cob::Target(node), Cob::Moment(node)),
+            dual(Cob::SdoRequest(node), Cob::Heartbeat(HEAD_NODE)),
+        ],
+        otherwise: None,
+        ..ControllerConfig::default()
+    }
+}

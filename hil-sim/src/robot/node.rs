@@ -1,0 +1,95 @@
+//! A vertebra as the simulator knows it: something that takes turns.
+
+use eel_protocol::{Frame, NodeId, State};
+use eel_units::Instant;
+use eel_vertebra::{Drive, Event, Sample, Settings, Vertebra, turn};
+
+/// Everything that went into a turn and came out of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn<'a> {
+    /// The node's clock.
+    pub now: Instant,
+    /// What it received since its last turn.
+    pub frames: &'a [Frame],
+    /// What it measured.
+    pub sample: &'a Sample,
+    /// What it sent.
+    pub sent: &'a [Frame],
+    /// What its bridges do.
+    pub drives: [Drive; 3],
+}
+
+/// Something that is a vertebra: natively, in an emulator, or on a board.
+pub trait Node {
+    /// Takes one turn of the control tick and appends what is to be sent.
+    fn turn(
+        &mut self,
+        now: Instant,
+        frames: &[Frame],
+        sample: &Sample,
+        sent: &mut Vec<Frame>,
+    ) -> [Drive; 3];
+
+    /// Starts anew, as after a power cycle of the microcontroller.
+    fn reset(&mut self, now: Instant);
+
+    /// Returns the vertebra itself where it lives in this process.
+    fn vertebra(&self) -> Option<&Vertebra>;
+
+    /// Returns the next thing that happened, where the node tells.
+    fn poll_event(&mut self) -> Option<Event>;
+
+    /// Returns the state, where the node tells.
+    fn state(&self) -> Option<State> {
+        self.vertebra().map(Vertebra::state)
+    }
+}
+
+/// A vertebra in this process.
+#[derive(Debug)]
+pub struct NativeNode {
+    settings: Settings,
+    vertebra: Vertebra,
+}
+
+impl NativeNode {
+    /// Powers a prototype up.
+    pub fn new(id: NodeId) -> Self {
+        Self::with_settings(prototype(id))
+    }
+
+    /// Powers a vertebra with these settings up.
+    pub fn with_settings(settings: Settings) -> Self {
+        Self { settings, vertebra: Vertebra::new(settings, Instant::ZERO) }
+    }
+}
+
+/// Returns the settings of the simulated vertebra; its serial number tells its place.
+pub fn prototype(id: NodeId) -> Settings {
+    Settings::prototype(id, 0x5EE1_0000 + u32::from(id.get()))
+}
+
+impl Node for NativeNode {
+    fn turn(
+        &mut self,
+        now: Instant,
+        frames: &[Frame],
+        sample: &Sample,
+        sent: &mut Vec<Frame>,
+    ) -> [Drive; 3] {
+        let frames = frames.iter().copied();
+        turn(&mut self.vertebra, now, frames, sample, |frame| sent.push(frame))
+    }
+
+    fn reset(&mut self, now: Instant) {
+        self.vertebra = Vertebra::new(self.settings, now);
+    }
+
+    fn vertebra(&self) -> Option<&Vertebra> {
+        Some(&self.vertebra)
+    }
+
+    fn poll_event(&mut self) -> Option<Event> {
+        self.vertebra.poll_event()
+    }
+}
