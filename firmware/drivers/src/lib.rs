@@ -1,4 +1,17 @@
-//! In the making.
+//! Drivers of a vertebra's bridges and crank encoders over embedded-hal.
+//!
+//! They hold no timing and no state of the vertebra; a board gives them its pins and timers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
+
+#[cfg(test)]
+extern crate std;
+
+mod bridge;
+mod counter;
+mod encoder;
+
+pub use bridge::{Bridge, BridgeError, Output};
+pub use counter::WideCounter;
+pub use encoder::{AbsoluteEncoder, EncoderError, Mounting};
