@@ -1,15 +1,58 @@
-//! In the making.
+//! The flashable image of a vertebra for the STM32G474RE, LQFP64.
+//!
+//! It gives [`eel_vertebra::Vertebra`] a clock, a bus, sensors and bridges, and decides nothing
+//! itself. Two executors run in interrupts: the bus above the control tick, so that no frame waits
+//! for a turn, and everything slow below both. The main thread sleeps.
+//!
+//! | function | pins | parts assumed on the board |
+//! |---|---|---|
+//! | CAN | PA11 FDCAN1_RX, PA12 FDCAN1_TX | 5 V transceiver, 3.3 V logic |
+//! | bridge PWM, motors 1–3 | PA8, PA9, PA10: TIM1_CH1–3 | DRV8874, PMODE low; pull-down |
+//! | bridge direction | PB0, PB1, PB10 | |
+//! | bridge wake | PC8, PC9, PC10 | nSLEEP, pulled down in the DRV8874 |
+//! | bridge fault | PC11, PC12, PD2, low when faulty | nFAULT, open drain |
+//! | emergency stop | PB12 TIM1_BKIN, high when stopped | loop to ground; a broken loop stops |
+//! | motor encoders | PA0/PA1 TIM2, PC6/PC7 TIM3, PB6/PB7 TIM4 | quadrature, 512 lines |
+//! | crank encoders | PA5 SCK, PA6 MISO, PA7 MOSI: SPI1; PB13, PB14, PB15 select | AS5047P, zero in ZPOS |
+//! | motor currents | PC0, PC1, PC2: ADC1_IN6–8 | 10 mΩ in line, INA240A2, half of VDDA at 0 A |
+//! | supply | PC3: ADC1_IN9 | 100 kΩ over 10 kΩ |
+//! | temperatures | PA4 board, PC4, PC5, PB2 motors: ADC2 | thermistors, see eel-drivers |
+//! | node number | PA2, PA3, PB9, PB11: 1, 2, 4, 8 | switches to ground; 1–10 |
+//! | crystal | PF0, PF1 | 24 MHz |
+//! | debugging | PA13, PA14 | SWD, RTT |
+//!
+//! The break input of TIM1 forces all PWM low without the CPU, which brakes the motors; the next
+//! control tick puts the bridges to sleep. Reset, a panic, a fault of the CPU and the watchdog leave
+//! the wake pins low: the motors are free.
+//!
+//! What is shown here by tests: that the image links with the pins' alternate functions as the HAL
+//! knows them, and, in QEMU and on the host, the drivers and the logic. What only a board can show,
+//! and no test here does: timing on the bus, the ADC's trigger, the break input, the watchdog.
 #![cfg_attr(target_os = "none", no_std, no_main)]
-#[cfg(not(target_os = "none"))]
-fn main() {}
+
 #[cfg(target_os = "none")]
-mod image {
-    use defmt_rtt as _;
-    #[cortex_m_rt::entry]
-    fn main() -> ! {
-        let _p = embassy_stm32::init(Default::default());
-        loop { cortex_m::asm::wfi() }
-    }
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo) -> ! { loop { } }
+mod bridges;
+#[cfg(target_os = "none")]
+mod bus;
+#[cfg(target_os = "none")]
+mod clocks;
+#[cfg(target_os = "none")]
+mod control;
+#[cfg(target_os = "none")]
+mod currents;
+#[cfg(target_os = "none")]
+mod failure;
+#[cfg(target_os = "none")]
+mod image;
+#[cfg(target_os = "none")]
+mod liveness;
+#[cfg(target_os = "none")]
+mod sensors;
+#[cfg(target_os = "none")]
+mod slow;
+
+/// Says what to do: the image only runs on the board.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("cargo xtask flash stm32g474");
 }

@@ -1,4 +1,4 @@
-//! Drivers of a vertebra's bridges and crank encoders over embedded-hal.
+//! Drivers of a vertebra's bridges and sensors over embedded-hal.
 //!
 //! They hold no timing and no state of the vertebra; a board gives them its pins and timers.
 #![no_std]
@@ -11,7 +11,9 @@ extern crate std;
 mod bridge;
 mod counter;
 mod encoder;
+mod thermistor;
 
 pub use bridge::{Bridge, BridgeError, Output};
 pub use counter::WideCounter;
 pub use encoder::{AbsoluteEncoder, EncoderError, Mounting};
+pub use thermistor::thermistor;

@@ -1,0 +1,159 @@
+//! Three H-bridges on TIM1, which the emergency stop line switches off without the CPU.
+
+use eel_drivers::{Bridge, BridgeError, Output};
+use eel_vertebra::Drive;
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output as Pin, OutputType, Pull, Speed};
+use embassy_stm32::pac;
+use embassy_stm32::pac::timer::vals::{Bkp, Mms2, Ossi, Ossr};
+use embassy_stm32::peripherals::*;
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannel};
+use embassy_stm32::timer::{BkIn1, BreakInputPin};
+
+/// Whether a motor's positive torque needs its direction input low, as its gears are mounted.
+const REVERSED: [bool; 3] = [false, false, false];
+
+const PWM_FREQUENCY: Hertz = Hertz::khz(20);
+
+/// What the bridges are connected to.
+pub struct Connections {
+    /// The timer of the PWM.
+    pub timer: Peri<'static, TIM1>,
+    /// PWM of the motors.
+    pub pwm: (Peri<'static, PA8>, Peri<'static, PA9>, Peri<'static, PA10>),
+    /// Direction of the motors.
+    pub direction: (Peri<'static, PB0>, Peri<'static, PB1>, Peri<'static, PB10>),
+    /// Wake inputs.
+    pub wake: (Peri<'static, PC8>, Peri<'static, PC9>, Peri<'static, PC10>),
+    /// Fault outputs.
+    pub fault: (Peri<'static, PC11>, Peri<'static, PC12>, Peri<'static, PD2>),
+    /// The emergency stop line.
+    pub stop: Peri<'static, PB12>,
+}
+
+type Motor = Bridge<SimplePwmChannel<'static, TIM1>, Pin<'static>, Pin<'static>>;
+
+/// The bridges of the three motors, and the lines that report on them.
+pub struct Bridges {
+    motors: [Motor; 3],
+    faults: [Input<'static>; 3],
+    stop: Flex<'static>,
+}
+
+impl Bridges {
+    /// Takes the connections; the bridges are off.
+    ///
+    /// # Errors
+    /// None that these connections can have.
+    pub fn new(connections: Connections) -> Result<Self, BridgeError> {
+        let Connections {
+            timer,
+            pwm,
+            direction,
+            wake,
+            fault,
+            stop,
+        } = connections;
+        let channels = SimplePwm::new(
+            timer,
+            Some(PwmPin::new(pwm.0, OutputType::PushPull)),
+            Some(PwmPin::new(pwm.1, OutputType::PushPull)),
+            Some(PwmPin::new(pwm.2, OutputType::PushPull)),
+            None,
+            PWM_FREQUENCY,
+            CountingMode::CenterAlignedBothInterrupts,
+        )
+        .split();
+        let stop = configure_break(stop);
+        let [one, two, three] = [channels.ch1, channels.ch2, channels.ch3].map(|mut channel| {
+            channel.set_duty_cycle(0);
+            channel.enable();
+            channel
+        });
+        Ok(Self {
+            motors: [
+                Bridge::new(one, low(direction.0), low(wake.0), REVERSED[0])?,
+                Bridge::new(two, low(direction.1), low(wake.1), REVERSED[1])?,
+                Bridge::new(three, low(direction.2), low(wake.2), REVERSED[2])?,
+            ],
+            faults: [
+                Input::new(fault.0, Pull::Up),
+                Input::new(fault.1, Pull::Up),
+                Input::new(fault.2, Pull::Up),
+            ],
+            stop,
+        })
+    }
+
+    /// Makes the bridges do this until the next tick.
+    pub fn apply(&mut self, drives: [Drive; 3]) {
+        for (motor, drive) in self.motors.iter_mut().zip(drives) {
+            let output = match drive {
+                Drive::Off => Output::Off,
+                Drive::Brake => Output::Brake,
+                Drive::Duty(duty) => Output::Duty(duty),
+            };
+            if motor.apply(output).is_err() {
+                force_off();
+            }
+        }
+    }
+
+    /// Tells which bridges report a fault.
+    pub fn faults(&self) -> [bool; 3] {
+        self.faults.each_ref().map(Input::is_low)
+    }
+
+    /// Tells whether the emergency stop line is or was asserted since the last call, and lets the
+    /// timer drive its outputs again where it no longer is. The vertebra has latched the stop then.
+    pub fn take_emergency_stop(&mut self) -> bool {
+        let is_asserted = self.stop.is_high();
+        let was_asserted = pac::TIM1.sr().read().bif(0);
+        if was_asserted && !is_asserted {
+            // Only bits written as 0 are cleared.
+            pac::TIM1.sr().write(|flags| {
+                flags.0 = u32::MAX;
+                flags.set_bif(0, false);
+            });
+            pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(true));
+        }
+        is_asserted || was_asserted
+    }
+}
+
+/// Makes an output that starts low.
+fn low(pin: Peri<'static, impl embassy_stm32::gpio::Pin>) -> Pin<'static> {
+    Pin::new(pin, Level::Low, Speed::Low)
+}
+
+/// Lets the emergency stop line force the PWM low, and the timer trigger the ADC once per period.
+fn configure_break(pin: Peri<'static, PB12>) -> Flex<'static> {
+    let function = BreakInputPin::<TIM1, BkIn1>::af_num(&*pin);
+    let mut line = Flex::new(pin);
+    line.set_as_af_unchecked(function, AfType::input(Pull::Up));
+    pac::TIM1.bdtr().modify(|outputs| {
+        outputs.set_ossr(Ossr::IDLE_LEVEL);
+        outputs.set_ossi(Ossi::IDLE_LEVEL);
+        outputs.set_bkp(0, Bkp::ACTIVE_HIGH);
+        outputs.set_bke(0, true);
+    });
+    pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(true));
+    // Centre-aligned, the timer updates twice per period; every second update is enough.
+    pac::TIM1.rcr().write(|repetition| repetition.set_rep(1));
+    pac::TIM1
+        .cr2()
+        .modify(|control| control.set_mms2(Mms2::UPDATE));
+    line
+}
+
+/// Switches all bridges off whatever state the program is in: PWM low, wake pins low.
+pub fn force_off() {
+    pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(false));
+    pac::GPIOC.bsrr().write(|pins| {
+        for wake in [8, 9, 10] {
+            pins.set_br(wake, true);
+        }
+    });
+}

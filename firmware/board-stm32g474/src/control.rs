@@ -1,0 +1,93 @@
+//! The control tick: once per millisecond, one turn of the vertebra.
+
+use eel_units::{Duration as Span, Instant as Moment};
+use eel_vertebra::{Event, Sample, Settings, Vertebra, turn};
+use embassy_time::{Duration, Instant, Ticker};
+
+use crate::bridges::{self, Bridges};
+use crate::currents::Currents;
+use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
+use crate::{bus, liveness};
+
+/// Everything that the tick measures with and acts on.
+pub struct Hardware {
+    /// The bridges.
+    pub bridges: bridges::Connections,
+    /// Current and supply measurement.
+    pub currents: crate::currents::Connections,
+    /// Motor encoders.
+    pub counters: crate::sensors::CounterConnections,
+    /// Crank encoders.
+    pub cranks: CrankConnections,
+}
+
+/// Runs the vertebra.
+#[embassy_executor::task]
+pub async fn run(hardware: Hardware, settings: Settings) {
+    let (crank_bus, select) = hardware.cranks.start();
+    let cranks = Cranks::new(&crank_bus, select);
+    let bridges = Bridges::new(hardware.bridges);
+    let (Some(mut cranks), Ok(mut bridges)) = (cranks, bridges) else {
+        // Can't happen with these pins; the watchdog starts anew.
+        bridges::force_off();
+        return;
+    };
+    let mut currents = Currents::new(hardware.currents);
+    let mut counters = Counters::new(hardware.counters);
+    let mut vertebra = Vertebra::new(settings, now());
+    let mut ticker = Ticker::every(Duration::from_millis(1));
+    loop {
+        ticker.next().await;
+        let start = Instant::now();
+        let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
+        let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
+        let drives = turn(&mut vertebra, now(), frames, &sample, bus::send);
+        bridges.apply(drives);
+        report(&mut vertebra);
+        let (received, transmitted) = bus::overruns();
+        vertebra.note_overruns(received, transmitted);
+        let micros = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
+        vertebra.note_loop_time(Span::from_micros(micros));
+        liveness::CONTROL.advance();
+    }
+}
+
+/// Returns the time since power-up.
+fn now() -> Moment {
+    Moment::from_micros(Instant::now().as_micros())
+}
+
+/// Measures everything once.
+fn measure(
+    bridges: &mut Bridges,
+    currents: &mut Currents,
+    counters: &mut Counters,
+    cranks: &mut Cranks<'_>,
+) -> Sample {
+    let measured = currents.take();
+    let (board_temperature, motor_temperature) = temperatures();
+    let faults = bridges.faults();
+    Sample {
+        encoder_counts: counters.read(),
+        absolute: cranks.read(),
+        current: measured.currents,
+        supply: measured.supply,
+        board_temperature,
+        motor_temperature,
+        bridge_fault: core::array::from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
+        emergency_stop: bridges.take_emergency_stop(),
+    }
+}
+
+/// Logs what happened.
+fn report(vertebra: &mut Vertebra) {
+    while let Some(event) = vertebra.poll_event() {
+        match event {
+            Event::State { from, to } => defmt::info!("{=str} -> {=str}", from.name(), to.name()),
+            Event::Emergency { emergency, .. } => {
+                defmt::warn!("{=str} ({=u16:#06x})", emergency.name, emergency.code);
+            }
+            Event::Reset => defmt::info!("reset by the head"),
+        }
+    }
+}

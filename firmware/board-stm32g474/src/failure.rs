@@ -1,0 +1,74 @@
+//! What happens when the program fails: bridges off, a note for the next start, reset.
+
+use core::cell::UnsafeCell;
+use core::panic::PanicInfo;
+use core::ptr;
+
+use cortex_m_rt::{ExceptionFrame, exception};
+
+use crate::bridges;
+
+const MAGIC: u32 = 0x0EE1_DEAD;
+
+/// Where a program failed: a line of the source, or an address for a fault of the CPU.
+#[derive(Clone, Copy)]
+pub struct Note {
+    magic: u32,
+    /// Line of the panic; 0 for a fault of the CPU.
+    pub line: u32,
+    /// Address of the instruction that faulted; 0 for a panic.
+    pub address: u32,
+}
+
+/// Memory that start-up leaves alone.
+struct Kept(UnsafeCell<Note>);
+
+// SAFETY: written with interrupts off just before a reset, read once before they are on.
+unsafe impl Sync for Kept {}
+
+#[unsafe(link_section = ".uninit.failure")]
+static KEPT: Kept = Kept(UnsafeCell::new(Note {
+    magic: 0,
+    line: 0,
+    address: 0,
+}));
+
+/// Returns the note of a failure before this start, and forgets it.
+pub fn take_note() -> Option<Note> {
+    // SAFETY: any bits are a valid `Note`, and nothing else runs yet.
+    let note = unsafe { ptr::read_volatile(KEPT.0.get()) };
+    keep(0, 0, 0);
+    (note.magic == MAGIC).then_some(note)
+}
+
+fn keep(magic: u32, line: u32, address: u32) {
+    // SAFETY: nothing else runs: before the start, or with interrupts off before a reset.
+    unsafe {
+        ptr::write_volatile(
+            KEPT.0.get(),
+            Note {
+                magic,
+                line,
+                address,
+            },
+        )
+    };
+}
+
+fn stop(line: u32, address: u32) -> ! {
+    cortex_m::interrupt::disable();
+    bridges::force_off();
+    keep(MAGIC, line, address);
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    stop(info.location().map_or(0, core::panic::Location::line), 0)
+}
+
+// SAFETY: the handler touches no memory of the program but the note, and never returns.
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    stop(0, frame.pc())
+}
