@@ -30,7 +30,11 @@ impl Instant {
     #[inline]
     pub const fn since(self, earlier: Self) -> Duration {
         let span = self.0.saturating_sub(earlier.0);
-        if span > u32::MAX as u64 { Duration(u32::MAX) } else { Duration(span as u32) }
+        if span > u32::MAX as u64 {
+            Duration(u32::MAX)
+        } else {
+            Duration(span as u32)
+        }
     }
 }
 
