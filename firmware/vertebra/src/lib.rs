@@ -12,6 +12,9 @@
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
 
+#[cfg(test)]
+extern crate std;
+
 mod command;
 mod core;
 mod current;
@@ -20,6 +23,7 @@ mod events;
 mod impedance;
 mod io;
 mod limits;
+pub mod lockstep;
 mod machine;
 mod objects;
 mod pending;
