@@ -1,5 +1,7 @@
 //! What the eel and its water are made of.
 
+use eel_kinematics::design::Geometry;
+
 use super::transmission::Transmission;
 
 /// The shape, the water, the motors and the simulation step of one eel.
@@ -134,7 +136,7 @@ impl Default for Config {
             ballast: None,
             locked: false,
             strips_per_body: 5,
-            transmission: Transmission::Direct,
+            transmission: Transmission::Wrist(Geometry::PARALLEL_ACTUATORS),
             motor: Motor::default(),
             stops_rad: [stop(30.0), stop(15.0), stop(4.0)],
             stop_stiffness: 2000.0,

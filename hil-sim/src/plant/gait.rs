@@ -5,9 +5,12 @@
 
 use std::f64::consts::TAU;
 
+use super::Plant;
+use super::algebra::Vec3;
 use super::body::{BODIES, JOINTS};
-use super::config::Shape;
-use super::joint::Target;
+use super::config::{Config, Shape};
+use super::joint::{Target, Tracking};
+use super::measures::{Figures, Moment, Recording, Stroke, swim_figures};
 
 /// How fast the amplitude grows from head to tail: e^{2.2} = 9 times.
 const GROWTH: f64 = 2.2;
@@ -74,4 +77,95 @@ impl Wave {
 fn smooth(share: f64) -> f64 {
     let x = share.clamp(0.0, 1.0);
     x * x * x * (10.0 + x * (6.0 * x - 15.0))
+}
+
+/// What a swim with ideal drives came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swim {
+    /// Its figures.
+    pub figures: Figures,
+    /// Largest yaw of a joint, rad.
+    pub peak_yaw_rad: f64,
+    /// Largest moment of a joint over the last six cycles, N·m.
+    pub peak_moment_nm: f64,
+    /// Largest difference between a joint's yaw and its target, rad.
+    pub tracking_error_rad: f64,
+}
+
+/// Swims the reference gait with ideal drives for a number of cycles; `None` when that is too
+/// short for figures.
+pub fn reference_swim(config: &Config, wave: &Wave, cycles: f64) -> Option<Swim> {
+    let mut plant = Plant::new(config, 1);
+    let steps = (cycles / (wave.frequency_hz * config.step_s)) as usize;
+    let every = (0.005 / config.step_s) as usize;
+    let (mut peak_yaw, mut peak_moment, mut error): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let mut recording = Recording {
+        interval_s: every as f64 * config.step_s,
+        moments: Vec::new(),
+    };
+    for step in 0..=steps {
+        if step % every == 0 {
+            recording.moments.push(Moment {
+                centre: plant.centre_of_mass(),
+                tail: plant.tail_edge(),
+                energy_j: plant.joint_energy_j(),
+            });
+        }
+        let targets = wave.targets(&config.shape, plant.time_s() + config.step_s);
+        plant.step_tracking(&targets, &Tracking::default());
+        let settled = plant.time_s() * wave.frequency_hz > cycles - 6.0;
+        for (joint, target) in targets.iter().enumerate() {
+            let yaw = plant.joint_pose(joint)[0];
+            peak_yaw = peak_yaw.max(yaw.abs());
+            error = error.max((yaw - target.pose[0]).abs());
+            if settled {
+                peak_moment = peak_moment.max(Vec3(plant.joint_moment(joint)).norm());
+            }
+        }
+    }
+    let stroke = Stroke {
+        frequency_hz: wave.frequency_hz,
+        wavelength_m: wave.wavelength_lengths * config.shape.length_m,
+        length_m: config.shape.length_m,
+    };
+    let figures = swim_figures(&recording, &stroke)?;
+    Some(Swim {
+        figures,
+        peak_yaw_rad: peak_yaw,
+        peak_moment_nm: peak_moment,
+        tracking_error_rad: error,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_swim_is_an_eels() {
+        let swim = reference_swim(&Config::default(), &Wave::default(), 20.0).unwrap();
+        println!("{swim:#?}");
+        let figures = &swim.figures;
+        // Kern & Koumoutsakos; Borazjani & Sotiropoulos; Carling et al.
+        assert!((0.26..=0.55).contains(&figures.stride_body_lengths));
+        assert!((0.30..=0.50).contains(&figures.strouhal));
+        assert!((0.45..=0.77).contains(&figures.slip));
+        assert!(figures.unsteadiness < 0.02);
+        assert!(swim.tracking_error_rad < 0.005);
+    }
+
+    #[test]
+    fn the_default_swim_agrees_with_the_prototype() {
+        let swim = reference_swim(&Config::default(), &Wave::default(), 20.0).unwrap();
+        let near = |found: f64, expected: f64, half_digit: f64| {
+            assert!((found - expected).abs() <= half_digit, "{found} {expected}");
+        };
+        near(swim.figures.speed_m_s, 0.66, 0.005);
+        near(swim.figures.stride_body_lengths, 0.44, 0.005);
+        near(swim.figures.slip, 0.55, 0.005);
+        near(swim.figures.strouhal, 0.40, 0.005);
+        near(swim.figures.mean_power_w, 2.0, 0.05);
+        near(swim.peak_moment_nm, 2.1, 0.05);
+        near(swim.peak_yaw_rad.to_degrees(), 26.6, 0.05);
+    }
 }

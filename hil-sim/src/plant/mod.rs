@@ -18,6 +18,8 @@ pub mod joint;
 pub mod measures;
 pub mod motor;
 pub mod random;
+#[cfg(test)]
+mod tests;
 pub mod transmission;
 mod view;
 pub mod water;
