@@ -5,7 +5,7 @@ use crate::emergency::Emergency;
 use crate::heartbeat::{Consumer, Producer};
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sync::Sync;
-use crate::{Config, NmtCommand, PdoDefault};
+use crate::{Config, NmtCommand};
 
 /// What the objects 0x1000–0x1FFF stand for.
 #[derive(Clone, Debug)]
@@ -21,8 +21,8 @@ pub(crate) struct Communication {
 impl Communication {
     pub fn new(config: &Config, now_us: u64) -> Self {
         let node_id = config.node_id;
-        let rpdo = |number| Rpdo::new(default(config.rpdos, number), node_id);
-        let tpdo = |number| Tpdo::new(default(config.tpdos, number), node_id);
+        let rpdo = |place| Rpdo::new(config.rpdos.get(place), node_id);
+        let tpdo = |place| Tpdo::new(config.tpdos.get(place), node_id);
         Self {
             producer: Producer::new(config.heartbeat_ms, now_us),
             consumer: Consumer::new(config.consumer),
@@ -36,10 +36,18 @@ impl Communication {
     /// Returns every parameter to its default. When only the communication is reset, the
     /// application's errors and the history stay.
     pub fn reset(&mut self, command: NmtCommand, config: &Config, now_us: u64) {
-        let fresh = Self::new(config, now_us);
-        let old = core::mem::replace(self, fresh);
-        self.emergency
-            .inherit(old.emergency, command == NmtCommand::ResetCommunication);
+        // In place, part by part: a whole new one would be copied twice.
+        let node_id = config.node_id;
+        self.producer = Producer::new(config.heartbeat_ms, now_us);
+        self.consumer = Consumer::new(config.consumer);
+        self.sync = Sync::new(config.sync_cob_id, config.sync_counter_overflow);
+        for (place, rpdo) in self.rpdos.iter_mut().enumerate() {
+            *rpdo = Rpdo::new(config.rpdos.get(place), node_id);
+        }
+        for (place, tpdo) in self.tpdos.iter_mut().enumerate() {
+            *tpdo = Tpdo::new(config.tpdos.get(place), node_id);
+        }
+        self.emergency.reset(command, config);
     }
 
     /// Returns when the earliest of the timers that always run ends.
@@ -50,8 +58,4 @@ impl Communication {
             .chain(self.consumer.deadline_us())
             .min()
     }
-}
-
-fn default(defaults: &'static [PdoDefault], number: usize) -> Option<&'static PdoDefault> {
-    defaults.get(number)
 }

@@ -3,12 +3,12 @@
 //! The application raises and clears what is its own; the node raises the errors of its own
 //! communication, each once until it is gone.
 
-use heapless::{Deque, HistoryBuf};
+use heapless::Deque;
 
 use crate::cob_id::{self, FRAME_BIT, INVALID_BIT};
-use crate::{Abort, Config};
+use crate::{Abort, Config, NmtCommand};
 
-/// Messages that wait for the inhibit time, or for the node to leave Stopped.
+/// The most messages that wait for the inhibit time, or for the node to leave Stopped.
 const WAITING: usize = 8;
 /// Errors that object 0x1003 remembers.
 pub(crate) const HISTORY: u8 = 8;
@@ -47,6 +47,24 @@ impl Fault {
     }
 }
 
+/// The last errors, the newest first.
+#[derive(Clone, Copy, Debug, Default)]
+struct History {
+    errors: [u32; HISTORY as usize],
+    length: u8,
+}
+
+impl History {
+    /// Records an error; the oldest is forgotten when there is no room.
+    fn record(&mut self, error: u32) {
+        let mut moved = error;
+        for slot in &mut self.errors {
+            core::mem::swap(slot, &mut moved);
+        }
+        self.length = (self.length + 1).min(HISTORY);
+    }
+}
+
 /// What is wrong, what was wrong, and what the bus has not been told yet.
 #[derive(Clone, Debug)]
 pub(crate) struct Emergency {
@@ -57,7 +75,7 @@ pub(crate) struct Emergency {
     application: u8,
     faults: u8,
     waiting: Deque<[u8; 8], WAITING>,
-    history: HistoryBuf<u32, { HISTORY as usize }>,
+    history: History,
     dropped: u32,
 }
 
@@ -71,19 +89,26 @@ impl Emergency {
             application: 0,
             faults: 0,
             waiting: Deque::new(),
-            history: HistoryBuf::new(),
+            history: History::default(),
             dropped: 0,
         }
     }
 
-    /// Takes over what outlives a reset: the counter, and after a reset of the communication
-    /// alone the application's errors and the history.
-    pub fn inherit(&mut self, old: Self, application_too: bool) {
-        self.dropped = old.dropped;
-        if application_too {
-            self.application = old.application;
-            self.history = old.history;
-        }
+    /// Starts anew but for the counter and, where only the communication is reset, the
+    /// application's errors and the history.
+    pub fn reset(&mut self, command: NmtCommand, config: &Config) {
+        let fresh = Self::new(config);
+        let everything = command == NmtCommand::ResetNode;
+        *self = Self {
+            dropped: self.dropped,
+            application: if everything { 0 } else { self.application },
+            history: if everything {
+                History::default()
+            } else {
+                self.history
+            },
+            ..fresh
+        };
     }
 
     /// Returns object 0x1001.
@@ -136,14 +161,16 @@ impl Emergency {
         }
     }
 
+    #[inline(never)] // One copy in flash.
     fn report(&mut self, code: u16, detail: [u8; 5]) {
         let [first, second, ..] = detail;
         let information = u16::from_le_bytes([first, second]);
         self.history
-            .write(u32::from(information) << 16 | u32::from(code));
+            .record(u32::from(information) << 16 | u32::from(code));
         self.send(code, detail);
     }
 
+    #[inline(never)] // One copy in flash.
     fn send(&mut self, code: u16, detail: [u8; 5]) {
         let [low, high] = code.to_le_bytes();
         let [a, b, c, d, e] = detail;
@@ -169,8 +196,8 @@ impl Emergency {
     }
 
     /// Returns how many errors object 0x1003 holds.
-    pub fn history_length(&self) -> u8 {
-        self.history.len() as u8
+    pub const fn history_length(&self) -> u8 {
+        self.history.length
     }
 
     /// Returns an error of object 0x1003, 1 being the newest.
@@ -181,13 +208,16 @@ impl Emergency {
         if subindex == 0 || subindex > HISTORY {
             return Err(Abort::NoSubindex);
         }
-        let age = usize::from(self.history_length()).checked_sub(usize::from(subindex));
-        let found = age.and_then(|age| self.history.oldest_ordered().nth(age));
-        found.copied().ok_or(Abort::NoData)
+        let recorded = self.history.errors.get(..usize::from(self.history.length));
+        let newest_first = usize::from(subindex) - 1;
+        recorded
+            .and_then(|errors| errors.get(newest_first))
+            .copied()
+            .ok_or(Abort::NoData)
     }
 
     pub fn clear_history(&mut self) {
-        self.history.clear();
+        self.history = History::default();
     }
 
     /// Returns object 0x1014.

@@ -57,6 +57,7 @@ pub(crate) struct EventQueue {
 }
 
 impl EventQueue {
+    #[inline(never)] // One copy in flash.
     pub fn push(&mut self, event: Event) {
         if self.events.is_full() {
             self.events.pop_front();

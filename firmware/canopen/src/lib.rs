@@ -2,6 +2,52 @@
 //!
 //! Frames and the time go in, frames and events come out; many nodes live in one process. What a
 //! node serves beyond the communication area (0x1000–0x1FFF) is an [`Application`].
+//!
+//! ```
+//! # use eel_canopen::*;
+//! # struct Nothing;
+//! # impl Application for Nothing {
+//! #     fn entry(&self, _: u16, _: u8) -> Result<Entry, Abort> { Err(Abort::NoObject) }
+//! #     fn read(&self, _: u16, _: u8, _: &mut [u8]) -> Result<usize, Abort> { Err(Abort::NoObject) }
+//! #     fn write(&mut self, _: u16, _: u8, _: &[u8]) -> Result<(), Abort> { Err(Abort::NoObject) }
+//! #     fn rpdo_applied(&mut self, _: u8, _: u16) {}
+//! #     fn tpdo_due(&mut self, _: u8, _: u16) {}
+//! # }
+//! # let mut application = Nothing;
+//! # let identity = Identity { vendor: 1, product: 2, revision: 3, serial: 4 };
+//! let mut node = Node::new(
+//!     Config {
+//!         node_id: 5,
+//!         identity,
+//!         device_type: 0,
+//!         device_name: "example",
+//!         hardware_version: "1",
+//!         software_version: "1",
+//!         heartbeat_ms: 200,
+//!         consumer: Some((127, 300)),
+//!         sync_cob_id: 0x080,
+//!         sync_counter_overflow: 0,
+//!         rpdos: &[],
+//!         tpdos: &[],
+//!     },
+//!     0,
+//! );
+//! let boot_up = node.poll_transmit();
+//! assert_eq!(boot_up, Frame::standard(0x705, &[0]));
+//!
+//! let start = Frame::standard(0, &[1, 5]).ok_or("nine bytes")?;
+//! node.handle_frame(1_000, &start, &mut application);
+//! assert_eq!(node.nmt_state(), NmtState::Operational);
+//!
+//! node.tick(200_000, &mut application);
+//! assert_eq!(node.poll_transmit(), Frame::standard(0x705, &[5]));
+//! # Ok::<(), &str>(())
+//! ```
+//!
+//! Served: NMT, heartbeats sent and watched (0x1016, 0x1017), SYNC with counter (0x1005, 0x1019),
+//! four RPDOs and four TPDOs with mapping at run time, inhibit and event times, emergencies
+//! (0x1001, 0x1003, 0x1014, 0x1015), one SDO server, expedited and segmented. Deliberately absent:
+//! remote frames and node guarding, identifiers of 29 bits, single bits in PDOs.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]

@@ -7,7 +7,7 @@ use crate::objects::Objects;
 use crate::pdo::Received;
 use crate::sdo::Server;
 use crate::transmit::TransmitQueue;
-use crate::{Application, Config, Event, Frame, NmtCommand, NmtState};
+use crate::{Application, Config, Event, Frame, Mapped, NmtCommand, NmtState};
 
 /// What a node had to give up, counted since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +22,8 @@ pub struct Counters {
     pub rpdos_short: u32,
     /// RPDOs of which the application refused an object.
     pub rpdos_refused: u32,
+    /// TPDOs that were due and not sent because the application refused an object.
+    pub tpdos_refused: u32,
 }
 
 /// A CANopen slave: one node id on one bus.
@@ -40,6 +42,7 @@ pub struct Node {
     events: EventQueue,
     rpdos_short: u32,
     rpdos_refused: u32,
+    tpdos_refused: u32,
 }
 
 impl Node {
@@ -56,6 +59,7 @@ impl Node {
             events: EventQueue::default(),
             rpdos_short: 0,
             rpdos_refused: 0,
+            tpdos_refused: 0,
         };
         node.boot();
         node
@@ -163,6 +167,7 @@ impl Node {
             emergencies_dropped: self.communication.emergency.dropped(),
             rpdos_short: self.rpdos_short,
             rpdos_refused: self.rpdos_refused,
+            tpdos_refused: self.tpdos_refused,
         }
     }
 
@@ -203,6 +208,7 @@ impl Node {
         }
     }
 
+    #[inline(never)] // One copy in flash.
     fn command(&mut self, now_us: u64, data: &[u8]) {
         let Some(command) = NmtCommand::for_node(self.config.node_id, data) else {
             return;
@@ -223,6 +229,7 @@ impl Node {
         });
     }
 
+    #[inline(never)] // One copy in flash.
     fn enter(&mut self, state: NmtState, now_us: u64) {
         self.state = state;
         for rpdo in &mut self.communication.rpdos {
@@ -321,6 +328,7 @@ impl Node {
         }
     }
 
+    #[inline(never)] // One copy in flash.
     fn apply_rpdo(&mut self, place: usize, app: &mut impl Application) {
         let Some(rpdo) = self.communication.rpdos.get_mut(place) else {
             return;
@@ -332,6 +340,7 @@ impl Node {
         }
     }
 
+    #[inline(never)] // One copy in flash.
     fn send_tpdo(&mut self, place: usize, now_us: u64, app: &mut impl Application) {
         let Some(parameters) = self
             .communication
@@ -354,20 +363,15 @@ impl Node {
             now_us,
         };
         let mut data = [0; 8];
-        let mut rest: &mut [u8] = &mut data;
-        for mapped in parameters.mapping() {
-            let Some((slot, others)) = rest.split_at_mut_checked(mapped.bytes()) else {
-                return;
-            };
-            if objects.read(mapped.index, mapped.subindex, slot) != Ok(slot.len()) {
-                return;
-            }
-            rest = others;
+        if read_mapped(&objects, parameters.mapping(), &mut data).is_none() {
+            self.tpdos_refused = self.tpdos_refused.saturating_add(1);
+            return;
         }
         let data = data.get(..usize::from(parameters.bytes())).unwrap_or(&[]);
         self.transmit.replace(parameters.cob_id(), data);
     }
 
+    #[inline(never)] // One copy in flash.
     fn serve(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
         let Ok(request) = data.try_into() else { return };
         let Self {
@@ -401,6 +405,23 @@ impl Node {
                 .push(self.communication.emergency.cob_id(), &message);
         }
     }
+}
+
+/// Puts the mapped objects one behind the other; `None` when one can't be read at its length.
+fn read_mapped<A: Application>(
+    objects: &Objects<'_, A>,
+    mapping: &[Mapped],
+    data: &mut [u8; 8],
+) -> Option<()> {
+    let mut rest: &mut [u8] = data;
+    for mapped in mapping {
+        let (slot, others) = rest.split_at_mut_checked(mapped.bytes())?;
+        if objects.read(mapped.index, mapped.subindex, slot) != Ok(slot.len()) {
+            return None;
+        }
+        rest = others;
+    }
+    Some(())
 }
 
 fn heartbeat_cob_id(node_id: u8) -> u16 {

@@ -18,6 +18,7 @@ pub(crate) struct TransmitQueue {
 
 impl TransmitQueue {
     /// Adds a frame behind all others.
+    #[inline(never)] // One copy in flash.
     pub fn push(&mut self, cob_id: u16, data: &[u8]) {
         let Some(frame) = Frame::standard(cob_id, data) else {
             return;
@@ -29,6 +30,7 @@ impl TransmitQueue {
 
     /// Adds a frame, in the place of one that waits with the same identifier. A boot-up message
     /// keeps its place: a heartbeat does not say what it says.
+    #[inline(never)] // One copy in flash.
     pub fn replace(&mut self, cob_id: u16, data: &[u8]) {
         let same = self.frames.iter_mut().find(|waiting| {
             waiting.cob_id() == Some(cob_id) && !(cob_id >= 0x700 && waiting.data() == [0])

@@ -91,6 +91,14 @@ fn a_refused_object_ends_the_rpdo() {
 }
 
 #[test]
+fn a_tpdo_that_can_not_be_read_is_not_sent_but_counted() {
+    let mut bench = Bench::operational();
+    bench.app.refuse = true;
+    assert_eq!(bench.ask(0x080, &[]), []);
+    assert_eq!(bench.node.counters().tpdos_refused, 1);
+}
+
+#[test]
 fn there_are_no_pdos_outside_operational_and_none_left_over() {
     let mut bench = Bench::operational();
     bench.hear(0x205, &TARGET);

@@ -27,6 +27,7 @@ pub(crate) struct Parameters {
 
 impl Parameters {
     /// Makes a PDO from its default for node `node_id`.
+    #[inline(never)] // One copy in flash.
     pub fn new(direction: Direction, default: &PdoDefault, node_id: u8) -> Self {
         let mut parameters = Self {
             direction,

@@ -146,6 +146,9 @@ impl Application for Store {
     }
 
     fn read(&self, index: u16, subindex: u8, out: &mut [u8]) -> Result<usize, Abort> {
+        if self.refuse {
+            return Err(Abort::DeviceState);
+        }
         let value: Vec<u8> = match (index, subindex) {
             (0x2000, at @ 1..=3) => self.target[usize::from(at) - 1].to_le_bytes().to_vec(),
             (0x2001, at @ 1..=2) => self.moment[usize::from(at) - 1].to_le_bytes().to_vec(),
