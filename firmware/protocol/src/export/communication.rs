@@ -267,3 +267,18 @@ pub const AREA: &[Area] = &[
         ],
     },
 ];
+
+/// Returns the name of an object of the communication area, such as `Device type`.
+pub fn communication_name(index: u16) -> Option<&'static str> {
+    let exact = AREA
+        .iter()
+        .find(|area| area.index == index)
+        .map(|area| area.name);
+    exact.or(match index {
+        0x1400..=0x15FF => Some("RPDO communication parameter"),
+        0x1600..=0x17FF => Some("RPDO mapping parameter"),
+        0x1800..=0x19FF => Some("TPDO communication parameter"),
+        0x1A00..=0x1BFF => Some("TPDO mapping parameter"),
+        _ => None,
+    })
+}

@@ -12,6 +12,7 @@ use core::fmt;
 
 use crate::dictionary::Scale;
 
+pub use communication::communication_name;
 pub use dbc::write_dbc;
 pub use eds::write_eds;
 pub use markdown::write_markdown;

@@ -1,0 +1,236 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::export::Format;
+use crate::filter::{Filter, Ids, Name, Node};
+use crate::source::Limits;
+use crate::stats::Statistics;
+use crate::{json, report};
+
+const AFTER: &str = "\
+Buses: vcan0 or can0 (SocketCAN, Linux), a candump file (candump -L; its name has a dot or a
+slash), or - for a candump recording on standard input. eel only listens; it never sends.
+
+Exit codes: 0 fine; 1 found a fault (bad, lost, repeated or late frames, a fault emergency, a line
+that can't be read); 2 wrong usage; 3 the bus or the file failed.
+
+Examples:
+  eel sniff vcan0 --node 3 --name pose        what vertebra 3 reports, live
+  eel sniff can0 --record dive.log --stats    everything, recorded, with a table at the end
+  eel decode swim.log --name target.yaw --json
+  eel stats swim.log                          load, rates, jitter, losses
+  eel export all --out docs/generated         EDS, DBC and tables for other tools";
+
+/// Anguilla's bus in words and numbers: sniff, decode, measure
+#[derive(Debug, Parser)]
+#[command(name = "eel", version, after_help = AFTER, disable_help_subcommand = true)]
+pub struct Eel {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Show what comes on a bus, decoded, line by line
+    #[command(after_help = listen_help())]
+    Sniff(Sniff),
+    /// Show a recorded candump file, decoded, line by line
+    #[command(after_help = listen_help())]
+    Decode(Decode),
+    /// Add up a file or a live bus: load, and rate, period, jitter and losses of each identifier
+    #[command(after_help = format!("--json: {}", report::SCHEMA))]
+    Stats(Stats),
+    /// Write the dictionary as EDS, DBC or markdown
+    Export(Export),
+}
+
+fn listen_help() -> String {
+    format!(
+        "Each line: time in s since the first frame, whose frame, message, signals with units, and \
+         after ! what is wrong with it.\n\n--json: {}",
+        json::SCHEMA
+    )
+}
+
+/// What both kinds of listening have in common.
+#[derive(Debug, Args)]
+pub struct Lines {
+    /// Only these identifiers: 0x203, 515, or a range 0x180-0x18A; may be repeated
+    #[arg(long = "id", value_name = "ID", value_delimiter = ',')]
+    ids: Vec<Ids>,
+    /// Only frames from or to this node: 1 to 127, or head; may be repeated
+    #[arg(long = "node", value_name = "NODE", value_delimiter = ',')]
+    nodes: Vec<Node>,
+    /// Only this message, or one signal of it: pose, pose.yaw; may be repeated
+    #[arg(long = "name", value_name = "NAME", value_delimiter = ',')]
+    names: Vec<Name>,
+    /// Write JSON lines (schema below)
+    #[arg(long)]
+    pub json: bool,
+    /// Show identifier and bytes too
+    #[arg(long)]
+    pub raw: bool,
+    /// Show times as recorded instead of since the first frame
+    #[arg(long)]
+    pub absolute: bool,
+    /// Colours: auto is on a terminal only, and never where NO_COLOR is set
+    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    pub color: Colour,
+    /// Stop at the first line of a file that can't be read (otherwise it is told, skipped and counted)
+    #[arg(long)]
+    strict: bool,
+    /// Stop after so many frames
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+}
+
+/// When to use colours.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Colour {
+    /// On a terminal
+    Auto,
+    /// Also into a pipe
+    Always,
+    /// Not at all
+    Never,
+}
+
+#[derive(Debug, Args)]
+pub struct Sniff {
+    /// The bus: vcan0, can0, a candump file, or -
+    pub bus: String,
+    #[command(flatten)]
+    pub lines: Lines,
+    /// Record everything, filtered or not, to a candump file
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<String>,
+    /// Print rates, periods, jitter and load to standard error at the end
+    #[arg(long)]
+    stats: bool,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    #[command(flatten)]
+    physical: Physical,
+}
+
+#[derive(Debug, Args)]
+pub struct Decode {
+    /// The candump file, or - for standard input
+    pub file: String,
+    #[command(flatten)]
+    pub lines: Lines,
+}
+
+#[derive(Debug, Args)]
+pub struct Stats {
+    /// The bus: a candump file, -, vcan0 or can0 (live until Ctrl-C or --seconds)
+    pub bus: String,
+    #[command(flatten)]
+    pub physical: Physical,
+    /// Write one JSON object (schema below)
+    #[arg(long)]
+    pub json: bool,
+    /// Stop at the first line of a file that can't be read (otherwise it is told, skipped and counted)
+    #[arg(long)]
+    strict: bool,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+/// What the numbers depend on.
+#[derive(Debug, Args)]
+pub struct Physical {
+    /// Bits a second of the bus
+    #[arg(long, value_name = "BIT/S", default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(10_000..=1_000_000))]
+    bitrate: u32,
+    /// SYNCs a second, against which gaps are judged
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = sync_hz)]
+    sync_hz: f64,
+}
+
+#[derive(Debug, Args)]
+pub struct Export {
+    /// What to write
+    pub format: Format,
+    /// The file, or the folder of `all`; standard output without it (`all`: the current folder)
+    #[arg(long, value_name = "PATH")]
+    pub out: Option<PathBuf>,
+}
+
+fn sync_hz(text: &str) -> Result<f64, String> {
+    let rate = text
+        .parse()
+        .ok()
+        .filter(|rate: &f64| (1.0..=1000.0).contains(rate));
+    rate.ok_or_else(|| "a rate from 1 to 1000 Hz".to_owned())
+}
+
+impl Lines {
+    /// Returns which frames are shown.
+    pub fn filter(&self) -> Filter {
+        Filter {
+            ids: self.ids.clone(),
+            nodes: self.nodes.clone(),
+            names: self.names.clone(),
+        }
+    }
+
+    /// Returns when to stop.
+    pub const fn limits(&self) -> Limits {
+        Limits {
+            strict: self.strict,
+            count: self.count,
+            seconds: None,
+        }
+    }
+}
+
+impl Sniff {
+    /// Returns when to stop.
+    pub const fn limits(&self) -> Limits {
+        Limits {
+            seconds: self.seconds,
+            ..self.lines.limits()
+        }
+    }
+
+    /// Returns what gathers the statistics, where they are wanted.
+    pub fn statistics(&self) -> Option<Statistics> {
+        self.stats.then(|| self.physical.statistics())
+    }
+}
+
+impl Stats {
+    /// Returns when to stop.
+    pub const fn limits(&self) -> Limits {
+        Limits {
+            strict: self.strict,
+            count: None,
+            seconds: self.seconds,
+        }
+    }
+}
+
+impl Physical {
+    /// Returns empty statistics.
+    pub fn statistics(&self) -> Statistics {
+        Statistics::new(self.bitrate, self.sync_hz)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_well_formed() {
+        Eel::command().debug_assert();
+    }
+}

@@ -1,0 +1,213 @@
+//! What an SDO frame says, in words.
+
+use std::fmt;
+
+use eel_protocol::dictionary;
+use eel_protocol::export::communication_name;
+
+use crate::decode::decimals;
+
+/// Which way an SDO frame goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// From the client.
+    Request,
+    /// From the node.
+    Response,
+}
+
+/// An SDO frame, to be printed.
+pub struct Sdo<'a> {
+    /// Which way it goes.
+    pub side: Side,
+    /// Its eight bytes.
+    pub data: &'a [u8],
+}
+
+impl fmt::Display for Sdo<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let &[command, low, high, subindex, a, b, c, d] = self.data else {
+            return write!(out, "an SDO has 8 bytes");
+        };
+        let object = Object {
+            index: u16::from_le_bytes([low, high]),
+            subindex,
+        };
+        if command == 0x80 {
+            let code = u32::from_le_bytes([a, b, c, d]);
+            return write!(out, "abort {object}: {} (0x{code:08X})", reason(code));
+        }
+        let value = Value {
+            object,
+            command,
+            data: [a, b, c, d],
+        };
+        match (self.side, command >> 5) {
+            (Side::Request, 1) => write!(out, "write {object}{value}"),
+            (Side::Request, 2) => write!(out, "read {object}"),
+            (Side::Response, 2) => write!(out, "answer {object}{value}"),
+            (Side::Response, 3) => write!(out, "written {object}"),
+            (Side::Request, 0) | (Side::Response, 0) => self.segment(out, command),
+            (Side::Request, 3) | (Side::Response, 1) => write!(out, "segment, please go on"),
+            (Side::Request, 5) | (Side::Response, 6) => write!(out, "block upload"),
+            (Side::Request, 6) | (Side::Response, 5) => write!(out, "block download"),
+            _ => write!(out, "unknown command 0x{command:02X}"),
+        }
+    }
+}
+
+impl Sdo<'_> {
+    /// Prints a segment's bytes.
+    fn segment(&self, out: &mut fmt::Formatter<'_>, command: u8) -> fmt::Result {
+        let length = 7 - usize::from((command >> 1) & 7);
+        let last = if command & 1 != 0 {
+            "last segment"
+        } else {
+            "segment"
+        };
+        write!(out, "{last}")?;
+        self.data
+            .iter()
+            .skip(1)
+            .take(length)
+            .try_for_each(|byte| write!(out, " {byte:02X}"))
+    }
+}
+
+/// An object with its name.
+#[derive(Clone, Copy)]
+struct Object {
+    index: u16,
+    subindex: u8,
+}
+
+impl fmt::Display for Object {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{:04X}:{}", self.index, self.subindex)?;
+        if let Ok((object, sub)) = dictionary::find(self.index, self.subindex) {
+            return write!(out, " {}", object.dotted(sub));
+        }
+        communication_name(self.index).map_or(Ok(()), |name| write!(out, " {name}"))
+    }
+}
+
+/// What an initiate frame carries.
+struct Value {
+    object: Object,
+    command: u8,
+    data: [u8; 4],
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = u32::from_le_bytes(self.data);
+        if self.command & 2 == 0 {
+            return write!(out, ", {number} bytes in segments");
+        }
+        let length = match self.command & 1 {
+            1 => 4 - usize::from((self.command >> 2) & 3),
+            _ => 4,
+        };
+        let bytes = self.data.get(..length).unwrap_or(&self.data);
+        let known = dictionary::find(self.object.index, self.object.subindex).ok();
+        if let Some((sub, raw)) =
+            known.and_then(|(_, sub)| Some((sub, sub.data_type.decode(bytes).ok()?)))
+        {
+            let scale = sub.scale;
+            let value = raw as f64 * f64::from(scale.numerator) / f64::from(scale.denominator);
+            let blank = if sub.unit.is_empty() { "" } else { " " };
+            let digits = decimals(scale.denominator);
+            return write!(out, " = {value:.digits$}{blank}{}", sub.unit);
+        }
+        write!(out, " = 0x")?;
+        bytes
+            .iter()
+            .rev()
+            .try_for_each(|byte| write!(out, "{byte:02X}"))
+    }
+}
+
+/// Says what an abort code means (CiA 301, 7.2.4.3.17).
+fn reason(code: u32) -> &'static str {
+    match code {
+        0x0503_0000 => "toggle bit not alternated",
+        0x0504_0000 => "timed out",
+        0x0504_0001 => "unknown command",
+        0x0504_0002 => "invalid block size",
+        0x0504_0003 => "invalid sequence number",
+        0x0504_0004 => "CRC error",
+        0x0504_0005 => "out of memory",
+        0x0601_0000 => "unsupported access",
+        0x0601_0001 => "write only",
+        0x0601_0002 => "read only",
+        0x0602_0000 => "no such object",
+        0x0604_0041 => "can't be mapped",
+        0x0604_0042 => "PDO too long",
+        0x0604_0043 => "parameter incompatible",
+        0x0606_0000 => "hardware failed",
+        0x0607_0010 => "wrong length",
+        0x0607_0012 => "too long",
+        0x0607_0013 => "too short",
+        0x0609_0011 => "no such subindex",
+        0x0609_0030 => "value not allowed",
+        0x0609_0031 => "value too high",
+        0x0609_0032 => "value too low",
+        0x0800_0000 => "general error",
+        0x0800_0020 => "can't transfer or store",
+        0x0800_0021 => "under local control",
+        0x0800_0022 => "not in this state",
+        0x0800_0024 => "no data",
+        _ => "unknown reason",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(data: [u8; 8]) -> String {
+        Sdo {
+            side: Side::Request,
+            data: &data,
+        }
+        .to_string()
+    }
+
+    fn response(data: [u8; 8]) -> String {
+        Sdo {
+            side: Side::Response,
+            data: &data,
+        }
+        .to_string()
+    }
+
+    #[test]
+    fn says_what_is_read_and_written() {
+        assert_eq!(
+            request([0x40, 0x10, 0x20, 1, 0, 0, 0, 0]),
+            "read 2010:1 pose.yaw"
+        );
+        assert_eq!(
+            response([0x4B, 0x10, 0x20, 1, 0x18, 0xFC, 0, 0]),
+            "answer 2010:1 pose.yaw = -0.1000 rad"
+        );
+        assert_eq!(
+            request([0x2B, 0x17, 0x10, 0, 0xC8, 0, 0, 0]),
+            "write 1017:0 Producer heartbeat time = 0x00C8"
+        );
+        assert_eq!(
+            response([0x60, 0x17, 0x10, 0, 0, 0, 0, 0]),
+            "written 1017:0 Producer heartbeat time"
+        );
+        assert_eq!(
+            response([0x41, 0x08, 0x10, 0, 17, 0, 0, 0]),
+            "answer 1008:0 Manufacturer device name, 17 bytes in segments"
+        );
+        assert_eq!(response([0x0D, 0x61, 0, 0, 0, 0, 0, 0]), "last segment 61");
+        assert_eq!(
+            response([0x80, 0x10, 0x20, 9, 0x11, 0, 9, 6]),
+            "abort 2010:9: no such subindex (0x06090011)"
+        );
+        assert_eq!(request([0xFF; 8]), "unknown command 0xFF");
+    }
+}

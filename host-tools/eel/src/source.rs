@@ -1,0 +1,111 @@
+//! Frames from any bus, with what to do about lines that can't be read.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use eel_transport::{Bus, BusError, Received};
+
+/// Lines that can't be read and are told one by one; the rest is only counted.
+const TOLD: u64 = 10;
+/// Longest wait before the caller may flush and look at the time.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Set by Ctrl-C.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// When to stop, and how strict to be.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits {
+    /// Whether a line that can't be read ends it all.
+    pub strict: bool,
+    /// After how many frames to stop.
+    pub count: Option<u64>,
+    /// After how long to stop.
+    pub seconds: Option<f64>,
+}
+
+/// What a pass over a bus has seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// Frames and error reports.
+    pub frames: u64,
+    /// Lines that could not be read.
+    pub malformed: u64,
+}
+
+/// Something that takes what comes from a bus.
+pub trait Sink {
+    /// Takes one frame or error report.
+    ///
+    /// # Errors
+    /// Those of its output; they end the pass.
+    fn take(&mut self, received: &Received) -> std::io::Result<()>;
+
+    /// Brings to light what was held back, as nothing comes at the moment.
+    ///
+    /// # Errors
+    /// Those of its output; they end the pass.
+    fn idle(&mut self) -> std::io::Result<()>;
+}
+
+/// Makes Ctrl-C end the pass in good order.
+///
+/// # Errors
+/// When the system refuses.
+pub fn catch_interrupt() -> Result<()> {
+    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed))
+        .context("can't listen for Ctrl-C")
+}
+
+/// Opens a bus or a file.
+///
+/// # Errors
+/// What the transport says, with the cure.
+pub fn open(url: &str) -> Result<Box<dyn Bus + Send>> {
+    Ok(eel_transport::open(url)?)
+}
+
+/// Hands everything that comes from `bus` to `sink` until the end, a limit or Ctrl-C.
+///
+/// # Errors
+/// Those of the bus and of the sink; a malformed line only with [`Limits::strict`].
+pub fn run(bus: &mut dyn Bus, limits: Limits, sink: &mut dyn Sink) -> Result<Seen> {
+    let begin = Instant::now();
+    let mut seen = Seen::default();
+    let is_over = |seen: &Seen| {
+        INTERRUPTED.load(Ordering::Relaxed)
+            || limits.count.is_some_and(|count| seen.frames >= count)
+    };
+    while !is_over(&seen) {
+        if limits
+            .seconds
+            .is_some_and(|limit| begin.elapsed().as_secs_f64() >= limit)
+        {
+            break;
+        }
+        match bus.receive(PATIENCE) {
+            Ok(Some(received)) => {
+                seen.frames += 1;
+                sink.take(&received)?;
+            }
+            Ok(None) => sink.idle()?,
+            Err(BusError::Ended) => break,
+            Err(error @ BusError::Line { .. }) if !limits.strict => {
+                seen.malformed += 1;
+                if seen.malformed <= TOLD {
+                    eprintln!("eel: {error}; line skipped");
+                }
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+    sink.idle()?;
+    if seen.malformed > TOLD {
+        eprintln!(
+            "eel: {} malformed lines in all; --strict stops at the first",
+            seen.malformed
+        );
+    }
+    Ok(seen)
+}
