@@ -3,29 +3,7 @@
 use crate::dictionary::{self, Pdo};
 use crate::ids::Cob;
 
-/// One mapped object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Mapped {
-    /// The object's index.
-    pub index: u16,
-    /// The object's subindex.
-    pub subindex: u8,
-    /// The object's length in bits.
-    pub bits: u8,
-}
-
-/// The communication and the mapping of one PDO.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PdoDefault {
-    /// COB-ID of node 0, to which the node id is added.
-    pub cob_id_base: u16,
-    /// Transmission type of CiA 301: 1–240 is every so many SYNCs.
-    pub transmission: u8,
-    /// Whether the PDO is on at power-up.
-    pub enabled: bool,
-    /// What it carries, from byte 0.
-    pub mapping: &'static [Mapped],
-}
+pub use eel_canopen::{Mapped, PdoDefault};
 
 /// Makes a mapping from `(index, subindex)` pairs; the length comes from the dictionary.
 ///

@@ -53,6 +53,8 @@ pub struct Item {
     pub data_type: Type,
     pub access: &'static str,
     pub default: Default,
+    /// Whether a TPDO may carry it.
+    pub mappable: bool,
 }
 
 /// One object.
@@ -98,6 +100,7 @@ const fn item(
         data_type,
         access,
         default,
+        mappable: false,
     }
 }
 
@@ -129,10 +132,18 @@ pub const AREA: &[Area] = &[
         0x1000,
         "Device type",
         U32,
-        "ro",
+        "const",
         Default::Hex(identity::DEVICE_TYPE)
     ),
-    variable!(0x1001, "Error register", U8, "ro", Default::Unknown),
+    Area {
+        index: 0x1001,
+        name: "Error register",
+        shape: Shape::Variable,
+        items: &[Item {
+            mappable: true,
+            ..item(0, "Error register", Type::U8, "ro", Default::Unknown)
+        }],
+    },
     Area {
         index: 0x1003,
         name: "Pre-defined error field",
@@ -217,24 +228,24 @@ pub const AREA: &[Area] = &[
                 1,
                 "Vendor-ID",
                 Type::U32,
-                "ro",
+                "const",
                 Default::Hex(identity::VENDOR),
             ),
             item(
                 2,
                 "Product code",
                 Type::U32,
-                "ro",
+                "const",
                 Default::Hex(identity::PRODUCT),
             ),
             item(
                 3,
                 "Revision number",
                 Type::U32,
-                "ro",
+                "const",
                 Default::Hex(identity::REVISION),
             ),
-            item(4, "Serial number", Type::U32, "ro", Default::Unknown),
+            item(4, "Serial number", Type::U32, "const", Default::Unknown),
         ],
     },
     variable!(
@@ -254,14 +265,14 @@ pub const AREA: &[Area] = &[
                 1,
                 "COB-ID client to server",
                 Type::U32,
-                "ro",
+                "const",
                 Default::PlusNodeId(Cob::SdoRequest(0).id() as u32),
             ),
             item(
                 2,
                 "COB-ID server to client",
                 Type::U32,
-                "ro",
+                "const",
                 Default::PlusNodeId(Cob::SdoResponse(0).id() as u32),
             ),
         ],

@@ -133,12 +133,16 @@ fn write_opening(out: &mut dyn Write, index: u16, name: &str, shape: Shape, subs
     )
 }
 
-/// Writes what an entry's section holds; one of the communication area is never mapped.
+/// Writes what an entry's section holds.
 fn write_item(out: &mut dyn Write, item: &Item) -> Result {
     write!(
         out,
-        "ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}\nAccessType={}\nDefaultValue={}\nPDOMapping=0\n",
-        item.name, item.data_type as u16, item.access, item.default
+        "ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}\nAccessType={}\nDefaultValue={}\nPDOMapping={}\n",
+        item.name,
+        item.data_type as u16,
+        item.access,
+        item.default,
+        u8::from(item.mappable)
     )
 }
 
@@ -171,12 +175,14 @@ fn write_pdo(out: &mut dyn Write, number: u16, pdo: &PdoDefault, direction: Dire
         data_type,
         access: "rw",
         default,
+        mappable: false,
     };
     let cob = rw(1, "COB-ID", Type::U32, cob_id);
     let transmission = rw(2, "Transmission type", Type::U8, transmission);
     let inhibit = rw(3, "Inhibit time", Type::U16, Default::Hex(0));
     let event = rw(5, "Event timer", Type::U16, Default::Hex(0));
-    let all = [cob, transmission, inhibit, event];
+    let start = rw(6, "SYNC start value", Type::U8, Default::Hex(0));
+    let all = [cob, transmission, inhibit, event, start];
     let items = match direction {
         Direction::Receive => all.get(..2),
         Direction::Transmit => all.get(..),
@@ -240,15 +246,14 @@ fn write_mapping(out: &mut dyn Write, index: u16, mapping: &[Mapped], name: &Nam
         data_type,
         access: "rw",
         default,
+        mappable: false,
     };
     writeln!(out, "\n[{index:04X}sub0]")?;
     let count = Default::Hex(mapping.len() as u32);
     write_item(out, &rw(0, "Number of mapped objects", Type::U8, count))?;
     for subindex in 1..=ENTRIES {
         let mapped = mapping.get(usize::from(subindex) - 1);
-        let raw = mapped.map_or(0, |m| {
-            u32::from(m.index) << 16 | u32::from(m.subindex) << 8 | u32::from(m.bits)
-        });
+        let raw = mapped.map_or(0, |mapped| mapped.to_raw());
         writeln!(out, "\n[{index:04X}sub{subindex:X}]")?;
         write_item(
             out,
@@ -275,6 +280,7 @@ fn write_object(out: &mut dyn Write, object: &Object) -> Result {
         data_type: Type::U8,
         access: "const",
         default: highest,
+        mappable: false,
     };
     write_item(out, &zero)?;
     object
