@@ -107,7 +107,7 @@ const STIFFNESS_SCALE: Shape = Shape {
     ..word(RW, RX)
 };
 const PEAK_TORQUE: Shape = Shape {
-    default: 4_000,
+    default: 3_000,
     max: 32_000,
     ..thousandths(DataType::U16, RW, NO, "N.m")
 };
@@ -519,35 +519,35 @@ const GAINS: &[Sub] = &[
         Field::StiffnessX,
         1,
         "stiffness_x",
-        stiffness(60_000),
+        stiffness(120_000),
         "Stiffness about x, swimming.",
     ),
     sub(
         Field::StiffnessY,
         2,
         "stiffness_y",
-        stiffness(60_000),
+        stiffness(120_000),
         "Stiffness about y, diving.",
     ),
     sub(
         Field::StiffnessZ,
         3,
         "stiffness_z",
-        stiffness(60_000),
+        stiffness(80_000),
         "Stiffness about z, torsion.",
     ),
     sub(
         Field::DampingX,
         4,
         "damping_x",
-        damping(2_000),
+        damping(4_000),
         "Damping about x, swimming.",
     ),
     sub(
         Field::DampingY,
         5,
         "damping_y",
-        damping(2_000),
+        damping(4_000),
         "Damping about y, diving.",
     ),
     sub(
@@ -764,6 +764,23 @@ pub const OBJECTS: &[Object] = &[
         subs: TIMING,
     },
 ];
+
+impl Field {
+    /// Returns the entry that the field serves, for its default, bounds and scale.
+    pub const fn sub(self) -> &'static Sub {
+        let mut place = self as usize;
+        let mut objects = OBJECTS;
+        while let [object, rest @ ..] = objects {
+            if place < object.subs.len() {
+                return &object.subs[place];
+            }
+            place -= object.subs.len();
+            objects = rest;
+        }
+        // Never reached: the check below holds that fields and entries correspond one to one.
+        &TARGET[0]
+    }
+}
 
 /// Returns where in [`OBJECTS`] an index stands, without a search.
 pub(super) const fn position(index: u16) -> Option<usize> {

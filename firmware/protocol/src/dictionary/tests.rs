@@ -107,3 +107,10 @@ fn a_value_outside_the_bounds_is_refused_with_the_code_that_says_so() {
     let (_, pose) = find(0x2010, 1).unwrap();
     assert_eq!(pose.accept(&[0, 0]), Err(Abort::ReadOnly));
 }
+
+#[test]
+fn each_field_leads_to_its_entry() {
+    for (_, sub) in entries() {
+        assert_eq!(sub.field.sub(), sub);
+    }
+}
