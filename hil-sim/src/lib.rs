@@ -8,5 +8,6 @@ pub mod bus;
 pub mod checks;
 pub mod picture;
 pub mod plant;
+pub mod realtime;
 pub mod robot;
 pub mod swim;

@@ -1,0 +1,170 @@
+//! Ten vertebrae in real time on a bus of the host, so that other programs can talk to them.
+//!
+//! The firmware's own logic and the plant run as in [`crate::robot`], but the bus is one that
+//! others share: a SocketCAN interface, or any [`Bus`]. All ten nodes use one socket; what one of
+//! them sends the other nine hear in its next tick. The head is not in here: it is whoever is on the
+//! bus. There is no arbitration, no frame time and no receive FIFO: those of the host's bus hold.
+//!
+//! Time for the nodes is the number of ticks, so what they do depends on what they receive and in
+//! which tick, never on how late the host was. A host that falls behind first catches up; what is
+//! beyond [`CATCH_UP_TICKS`] is left out and counted.
+
+mod pace;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant as HostInstant};
+
+use eel_protocol::{Frame, NodeId};
+use eel_transport::{Bus, BusError, Received};
+use eel_units::Instant;
+use eel_vertebra::Drive;
+
+use crate::plant::{Config as PlantConfig, Plant};
+use crate::robot::{NODES, NativeNode, Node, PLANT_STEP_NS, TICK_NS};
+
+pub use pace::{CATCH_UP_TICKS, Pace};
+
+/// Frames that are taken from the bus in one tick at most; the rest waits in the bus.
+const RECEIVED_PER_TICK: usize = 256;
+/// Frames that wait to be sent while the bus takes none.
+const WAITING: usize = 1024;
+
+/// What happened so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Control ticks of all nodes.
+    pub ticks: u64,
+    /// Ticks left out because the host was too late.
+    pub skipped: u64,
+    /// Frames that came from the bus.
+    pub received: u64,
+    /// Frames sent.
+    pub sent: u64,
+    /// Frames thrown away because the bus took none for too long.
+    pub dropped: u64,
+}
+
+/// Ten vertebrae and their plant on one bus.
+pub struct Realtime<B> {
+    bus: B,
+    plant: Plant,
+    nodes: Vec<NativeNode>,
+    drives: [[Drive; 3]; NODES],
+    /// What the nodes sent in their last tick, and which of them.
+    local: Vec<(usize, Frame)>,
+    incoming: Vec<Frame>,
+    outgoing: VecDeque<Frame>,
+    counters: Counters,
+}
+
+impl<B: Bus> Realtime<B> {
+    /// Powers ten prototypes up in still water; the seed sets encoder positions and sensor noise.
+    pub fn new(bus: B, plant: &PlantConfig, seed: u64) -> Self {
+        Self {
+            bus,
+            plant: Plant::new(plant, seed),
+            nodes: NodeId::all().map(NativeNode::new).collect(),
+            drives: [[Drive::Off; 3]; NODES],
+            local: Vec::new(),
+            incoming: Vec::new(),
+            outgoing: VecDeque::new(),
+            counters: Counters::default(),
+        }
+    }
+
+    /// Runs a tick a millisecond of the host's clock for as long as `keep_going` agrees, which is
+    /// asked about every millisecond.
+    ///
+    /// # Errors
+    /// What the bus fails with.
+    pub fn run(&mut self, mut keep_going: impl FnMut() -> bool) -> Result<Counters, BusError> {
+        let start = HostInstant::now();
+        let mut pace = Pace::default();
+        while keep_going() {
+            for _ in 0..pace.due(start.elapsed()) {
+                self.tick()?;
+            }
+            self.counters.skipped = pace.skipped();
+            let wait = pace.until_next(start.elapsed());
+            if !wait.is_zero() {
+                std::thread::sleep(wait);
+            }
+        }
+        Ok(self.counters)
+    }
+
+    /// Does one tick of every node, and a millisecond of the plant.
+    ///
+    /// # Errors
+    /// What the bus fails with.
+    pub fn tick(&mut self) -> Result<(), BusError> {
+        self.receive()?;
+        let now = Instant::from_micros(self.counters.ticks * TICK_NS / 1_000);
+        let (heard, mut frames, mut sent) = (std::mem::take(&mut self.local), vec![], vec![]);
+        for (index, node) in self.nodes.iter_mut().enumerate() {
+            frames.clear();
+            let others = heard.iter().filter(|(sender, _)| *sender != index);
+            frames.extend(others.map(|(_, frame)| *frame));
+            frames.extend_from_slice(&self.incoming);
+            let sample = self.plant.sample(index);
+            self.drives[index] = node.turn(now, &frames, &sample, &mut sent);
+            self.local
+                .extend(sent.drain(..).map(|frame| (index, frame)));
+        }
+        for _ in 0..TICK_NS / PLANT_STEP_NS {
+            self.plant.step(&self.drives);
+        }
+        self.counters.ticks += 1;
+        self.send()
+    }
+
+    /// Returns the plant.
+    pub const fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Returns a vertebra.
+    pub fn node(&self, id: NodeId) -> &NativeNode {
+        &self.nodes[id.index()]
+    }
+
+    /// Returns what happened so far.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn receive(&mut self) -> Result<(), BusError> {
+        self.incoming.clear();
+        while self.incoming.len() < RECEIVED_PER_TICK
+            && let Some(received) = self.bus.receive(Duration::ZERO)?
+        {
+            // The host's reports of bus errors are for whoever watches the bus.
+            self.incoming.extend(Received::frame(&received));
+        }
+        self.counters.received += self.incoming.len() as u64;
+        Ok(())
+    }
+
+    /// Sends what waits, as far as the bus takes it.
+    fn send(&mut self) -> Result<(), BusError> {
+        for (_, frame) in &self.local {
+            if self.outgoing.len() < WAITING {
+                self.outgoing.push_back(*frame);
+            } else {
+                self.counters.dropped += 1;
+            }
+        }
+        while let Some(frame) = self.outgoing.front() {
+            match self.bus.send(frame) {
+                Ok(()) => self.counters.sent += 1,
+                Err(BusError::Full) => break,
+                Err(error) => return Err(error),
+            }
+            self.outgoing.pop_front();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

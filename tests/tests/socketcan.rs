@@ -1,0 +1,14 @@
+//! What holds on a real SocketCAN interface: `cargo xtask vcan -- …` or a vcan0 of the host.
+//!
+//! The interface's name comes in `ANGUILLA_VCAN`. Inside User-mode Linux there is one slow
+//! processor, so nothing here asserts a wall-clock time.
+
+#[cfg(target_os = "linux")]
+#[path = "socketcan/can_utils.rs"]
+mod can_utils;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/support.rs"]
+mod support;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/ten_nodes.rs"]
+mod ten_nodes;

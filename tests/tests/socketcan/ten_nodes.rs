@@ -1,0 +1,128 @@
+//! Ten vertebrae on a real interface, met by python-canopen and watched by candump.
+
+use std::env;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use eel_protocol::{Cob, Frame, VERTEBRAE, identity};
+use eel_transport::SocketBus;
+use eel_transport::candump::{Line, parse_line};
+use hil_sim::plant::Config;
+use hil_sim::realtime::{Counters, Realtime};
+use serde_json::Value;
+
+use crate::support::{Program, interface, listeners, wait_for_listeners};
+
+/// The nodes in a thread of their own until they are told to stop.
+struct Nodes {
+    stop: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<Counters>>,
+}
+
+impl Nodes {
+    fn start(interface: &str) -> Self {
+        let bus = SocketBus::open(interface).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&stop);
+        let thread = thread::spawn(move || {
+            let mut nodes = Realtime::new(bus, &Config::default(), 1);
+            nodes.run(|| !told.load(Ordering::Relaxed)).unwrap()
+        });
+        Self {
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    fn end(mut self) -> Counters {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap()
+    }
+}
+
+impl Drop for Nodes {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Runs the Python script and returns what it found by node id.
+fn meet(interface: &str) -> Value {
+    let python = env::var("ANGUILLA_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/python/ten_nodes.py");
+    let output = Command::new(&python)
+        .args([script, interface])
+        .stderr(Stdio::inherit())
+        .output()
+        .unwrap_or_else(|error| panic!("{python}: {error}; `cargo xtask setup` makes one"));
+    assert!(
+        output.status.success(),
+        "{script} ended with {}",
+        output.status
+    );
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+#[test]
+fn python_canopen_meets_ten_vertebrae_and_candump_sees_them() {
+    let Some(name) = interface() else { return };
+    let before = listeners();
+    let candump = Program::start(&["candump", "-L", &name]);
+    wait_for_listeners(before, 1);
+    let nodes = Nodes::start(&name);
+    let found = meet(&name);
+    let counters = nodes.end();
+    candump.interrupt();
+    let log = candump.output();
+
+    let mut serials = Vec::new();
+    for node in 1..=VERTEBRAE {
+        let node = &found[node.to_string()];
+        assert_eq!(node["first_state"], "PRE-OPERATIONAL");
+        assert_eq!(node["device_type"], identity::DEVICE_TYPE);
+        assert_eq!(node["vendor"], identity::VENDOR);
+        assert_eq!(node["heartbeat_ms"], eel_protocol::VERTEBRA_HEARTBEAT_MS);
+        assert_eq!(node["missing_object"], 0x0602_0000, "object does not exist");
+        serials.push(node["serial"].as_u64().expect("a serial number"));
+    }
+    serials.dedup();
+    assert_eq!(
+        serials.len(),
+        usize::from(VERTEBRAE),
+        "every node is one of its own"
+    );
+
+    let frames: Vec<Frame> = log
+        .lines()
+        .map(|line| match parse_line(line.as_bytes()) {
+            Ok(Line::Frame(record)) => record.frame,
+            other => panic!("{line}: {other:?}"),
+        })
+        .collect();
+    for node in 1..=VERTEBRAE {
+        let of = |cob: Cob| {
+            frames
+                .iter()
+                .filter(move |frame| frame.cob_id() == Some(cob.id()))
+        };
+        let states: Vec<u8> = of(Cob::Heartbeat(node))
+            .map(|frame| frame.data()[0])
+            .collect();
+        assert_eq!(states.first(), Some(&0x00), "node {node} boots up once");
+        for state in [0x7F, 0x05] {
+            assert!(states[1..].contains(&state), "node {node}: {states:02X?}");
+        }
+        assert!(
+            !states[1..].contains(&0x00),
+            "node {node} restarted: {states:02X?}"
+        );
+        assert_eq!(
+            of(Cob::SdoRequest(node)).count(),
+            of(Cob::SdoResponse(node)).count()
+        );
+    }
+    assert_eq!(counters.dropped, 0);
+    println!("{counters:?}, candump saw {} frames", frames.len());
+}
