@@ -160,6 +160,11 @@ impl Head {
         self.events.pop()
     }
 
+    /// Returns how many events were forgotten because nobody polled them.
+    pub const fn events_dropped(&self) -> u32 {
+        self.events.dropped()
+    }
+
     /// Lets the gait fade out, straightens the eel and switches it off.
     pub fn stop(&mut self, now: Instant) {
         if matches!(self.phase, Phase::Starting | Phase::Swimming) {

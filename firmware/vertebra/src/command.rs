@@ -119,11 +119,6 @@ impl CommandStream {
         now.since(self.last_good) >= TARGET_TIMEOUT
     }
 
-    /// Returns how many periods have passed without a target.
-    pub const fn missed(&self) -> u8 {
-        self.missed
-    }
-
     /// Returns the time since the segment began, and its length.
     pub const fn place(&self, now: Instant) -> (Duration, Duration) {
         (now.since(self.segment_start), self.period)

@@ -65,11 +65,6 @@ impl Machine {
         matches!(self.state, State::Run | State::Hold | State::Damped | State::Brake)
     }
 
-    /// Tells whether an "off" was seen, without which nothing enables.
-    pub const fn is_armed(&self) -> bool {
-        self.armed
-    }
-
     /// Takes the mode of a target frame. A latched state stays while `cleared` is false.
     pub fn command(&mut self, now: Instant, mode: Mode, cleared: bool) -> Outcome {
         let before = self.last_mode.replace(mode);

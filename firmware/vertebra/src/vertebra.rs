@@ -74,6 +74,11 @@ impl Vertebra {
         self.core.events.pop()
     }
 
+    /// Returns how many events were forgotten because nobody polled them.
+    pub fn events_dropped(&self) -> u32 {
+        self.core.events.dropped()
+    }
+
     /// Returns the place in the chain.
     pub fn node_id(&self) -> NodeId {
         self.core.settings.node

@@ -177,7 +177,7 @@ impl Watcher {
         if self.snapshots.len() <= SNAPSHOTS && robot.now_ns() >= due_ns {
             self.snapshots.push(picture::Snapshot {
                 time_s: robot.now_ns() as f64 / 1e9,
-                points: robot.plant().spine_points(),
+                spine: robot.plant().spine_points().to_vec(),
             });
         }
     }
@@ -196,7 +196,7 @@ impl Watcher {
 
     /// Closes the records and adds everything up.
     fn finish(
-        mut self,
+        self,
         options: &Options,
         robot: &Robot,
         operational: usize,
@@ -209,7 +209,14 @@ impl Watcher {
             length_m,
         };
         let figures = swim_figures(&self.recording, &stroke);
-        let drawing = picture::stride_svg(&self.snapshots, robot.plant().config());
+        let caption = picture::Caption {
+            title: "One stride of the simulated eel".into(),
+            subtitle: format!(
+                "{} Hz, amplitude {} L, wavelength {} L, seed {}",
+                options.frequency_hz, options.amplitude, options.wavelength, options.seed
+            ),
+        };
+        let drawing = picture::stride_svg(&self.snapshots, &robot.plant().config().shape, &caption);
         let files = self.records.finish(&drawing)?;
         let nodes: Vec<NodeSummary> = (0..NODES).map(|index| self.tracking.node(index)).collect();
         let statistics = robot.bus_statistics();
