@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow, bail};
 use eel_transport::{Bus, BusError, Received};
 
 /// Lines that can't be read and are told one by one; the rest is only counted.
@@ -63,7 +63,8 @@ pub fn catch_interrupt() -> Result<()> {
 /// # Errors
 /// What the transport says, with the cure.
 pub fn open(url: &str) -> Result<Box<dyn Bus + Send>> {
-    Ok(eel_transport::open(url)?)
+    // The message of a bus error holds its cause already.
+    eel_transport::open(url).map_err(|error| anyhow!(error.to_string()))
 }
 
 /// Hands everything that comes from `bus` to `sink` until the end, a limit or Ctrl-C.
@@ -97,7 +98,7 @@ pub fn run(bus: &mut dyn Bus, limits: Limits, sink: &mut dyn Sink) -> Result<See
                     eprintln!("eel: {error}; line skipped");
                 }
             }
-            Err(error) => return Err(error.into()),
+            Err(error) => bail!(error.to_string()),
         }
     }
     sink.idle()?;

@@ -79,7 +79,9 @@ impl Look {
         }
         self.paint(out, BOLD, format_args!("{:<12}", decoded.name()))?;
         for (signal, raw) in decoded.signals() {
-            if filter.shows(decoded.name(), signal.name) {
+            // A flag is told when it is set.
+            let is_told = signal.bits > 1 || raw != 0;
+            if is_told && filter.shows(decoded.name(), signal.name) {
                 self.signal(out, signal, raw)?;
             }
         }
@@ -115,6 +117,9 @@ impl Look {
     fn signal(self, out: &mut dyn Write, signal: &Signal, raw: i64) -> Result<()> {
         write!(out, "  ")?;
         self.paint(out, CYAN, format_args!("{}", signal.name))?;
+        if signal.bits == 1 {
+            return Ok(());
+        }
         write!(out, " ")?;
         match (signal.choices, signal.choices.name(raw)) {
             (_, Some(name)) => write!(out, "{name}"),

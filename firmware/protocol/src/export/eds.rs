@@ -314,8 +314,11 @@ fn write_sub(out: &mut dyn Write, object: &Object, sub: &Sub) -> Result {
     }
     writeln!(out, "DefaultValue={}", sub.default)?;
     writeln!(out, "PDOMapping={}", u8::from(sub.pdo != Pdo::No))?;
+    if sub.scale.numerator != sub.scale.denominator {
+        writeln!(out, "Factor={}", Decimal(sub.scale))?;
+    }
     if !sub.unit.is_empty() {
-        writeln!(out, "Factor={}\nUnit={}", Decimal(sub.scale), sub.unit)?;
+        writeln!(out, "Unit={}", sub.unit)?;
     }
     // A semicolon would begin a comment for some readers.
     write!(out, "Description=")?;
