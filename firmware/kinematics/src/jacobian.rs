@@ -78,7 +78,7 @@ impl Jacobian {
         })
     }
 
-    /// Returns det A in Q30: 1 at home, at least 0.679 in the paper's workspace.
+    /// Returns det A in Q30: 1 at home, at least 0.674 in the paper's workspace.
     #[inline]
     pub const fn det_a(&self) -> i32 {
         self.determinant

@@ -47,12 +47,17 @@ pub struct Shared {
 /// All of it, as a fraction in Q30.
 const WHOLE: i32 = 1 << 30;
 
+/// By how much a component may pass a motor's bound without being cut for it: 0.5 µN·m in Q24.
+const SLACK: i64 = 8;
+
 impl Jacobian {
     /// Shares a moment among the motors within their bounds, yaw before pitch before roll.
     ///
-    /// Yaw is scaled to the largest feasible fraction; with that fixed, pitch; then roll. Fractions
-    /// are at most 3 parts in 10⁹ below the largest feasible one, and a step of Q24. Where nothing is
-    /// bounded the torques equal those of [`Jacobian::torques`] to two steps.
+    /// Yaw is scaled to the largest feasible fraction; with that fixed, pitch; then roll. A motor
+    /// at its bound may be passed by 0.5 µN·m, which it then does not give: without that, a
+    /// coupling of parts in 10⁹ to a motor at its bound would refuse a whole component. So the
+    /// achieved moment is what the torques make to 10 µN·m. Where nothing is bounded the torques equal
+    /// those of [`Jacobian::torques`] to two steps.
     pub fn share(&self, moment: [Torque; 3], bounds: &[Bounds; 3]) -> Shared {
         let rows = self.torque_rows();
         let limits = bounds.map(|bound| {
@@ -73,9 +78,9 @@ impl Jacobian {
             for motor in 0..3 {
                 let (low, high) = limits[motor];
                 let (room, need, side) = if wanted[motor] < 0 {
-                    (torque[motor] - low, -wanted[motor], Side::Low)
+                    (torque[motor] - low + SLACK, -wanted[motor], Side::Low)
                 } else {
-                    (high - torque[motor], wanted[motor], Side::High)
+                    (high - torque[motor] + SLACK, wanted[motor], Side::High)
                 };
                 if need > room {
                     let feasible = fraction_of(room, need);
@@ -94,7 +99,7 @@ impl Jacobian {
                 let (low, high) = limits[motor];
                 // |wanted · fraction| is at most the room, 2³², in Q30.
                 let given = (wanted[motor] * i64::from(fraction) + (1 << 29)) >> 30;
-                // The fraction keeps the bounds but for the rounding of the last step.
+                // The fraction keeps the bounds but for the slack.
                 torque[motor] = (torque[motor] + given).max(low).min(high);
             }
             achieved[axis] = Torque::from_q24(round_shift::<30>(asked * i64::from(fraction)));

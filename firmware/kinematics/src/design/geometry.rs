@@ -45,7 +45,8 @@ impl Leg {
     /// Returns both crank angles for the platform's point C: home's working mode, (l×r)·i > 0, first.
     pub fn inverse(&self, point: &Vector3<f64>) -> Option<[f64; 2]> {
         let (e, f, g, root) = self.terms(point)?;
-        Some([2.0 * atan2(g - e, f + root), 2.0 * atan2(g - e, f - root)])
+        // tan(θ/2) = (G − E)/(F + √D) and (F + √D)/(G + E): neither cancels near home.
+        Some([2.0 * atan2(g - e, f + root), 2.0 * atan2(f + root, g + e)])
     }
 
     /// Returns E, F, G of E cos θ + F sin θ = G, and √(E² + F² − G²).

@@ -1,0 +1,169 @@
+//! Whatever bits arrive: no panic, and an answer is either right or an error.
+#![expect(clippy::float_arithmetic, reason = "the oracle is in double precision")]
+
+mod common;
+
+use common::{Q29, Random, angle_between, exact_joints, exact_rotation, matrix, radians};
+use eel_kinematics::design::Geometry;
+use eel_kinematics::{Bounds, Joints, Pose, Rotation, Wrist};
+use eel_units::{Angle, AngularVelocity, Torque};
+
+/// Bits of every magnitude: full range, the kernel's range, corners.
+fn bits(random: &mut Random) -> i32 {
+    const CORNERS: [i32; 9] = [
+        i32::MIN,
+        i32::MIN + 1,
+        -1,
+        0,
+        1,
+        421_657_428,
+        603_979_776,
+        603_979_777,
+        i32::MAX,
+    ];
+    match random.next() % 8 {
+        0 => CORNERS[(random.next() % 9) as usize],
+        1 => random.bits(),
+        2 => random.bits() >> (random.next() % 31),
+        _ => random.bits() >> 2,
+    }
+}
+
+fn three(random: &mut Random) -> [i32; 3] {
+    [bits(random), bits(random), bits(random)]
+}
+
+#[test]
+fn the_inverse_answers_rightly_or_not_at_all() {
+    let geometry = Geometry::PARALLEL_ACTUATORS;
+    let mut random = Random::new(0xA11B_1750_0000_0001);
+    let (mut answers, mut refusals, mut worst) = (0, 0, 0.0f64);
+    for _ in 0..500_000 {
+        let [yaw, pitch, roll] = three(&mut random).map(Angle::from_q29);
+        let pose = Pose { yaw, pitch, roll };
+        let Ok(found) = Wrist::PAPER.inverse(&pose) else {
+            refusals += 1;
+            continue;
+        };
+        answers += 1;
+        let exact = geometry
+            .inverse(&exact_rotation(&pose))
+            .expect("reached in fixed point only");
+        for (a, b) in exact_joints(&found.joints).into_iter().zip(exact) {
+            worst = worst.max((a - b).abs());
+        }
+    }
+    println!(
+        "{answers} answers, {refusals} refusals, worst error {:.4} µrad",
+        worst * 1e6
+    );
+    assert!(answers > 10_000 && refusals > 10_000);
+    assert!(worst <= 0.05e-6, "{worst:e}");
+}
+
+#[test]
+fn the_direct_kinematics_answers_rightly_or_not_at_all() {
+    let geometry = Geometry::PARALLEL_ACTUATORS;
+    let mut random = Random::new(0xA11B_1750_0000_0002);
+    let (mut answers, mut refusals, mut worst) = (0, 0, 0.0f64);
+    for _ in 0..500_000 {
+        let mut raw = three(&mut random);
+        if random.next().is_multiple_of(2) {
+            raw[2] = (raw[2] >> 1).saturating_add(421_657_428);
+        }
+        let joints = Joints(raw.map(Angle::from_q29));
+        let Ok(found) = Wrist::PAPER.direct(&joints) else {
+            refusals += 1;
+            continue;
+        };
+        answers += 1;
+        let exact = geometry
+            .direct(&exact_joints(&joints))
+            .expect("joined in fixed point only");
+        worst = worst.max(angle_between(&matrix(&found.rotation), &exact));
+        assert!(found.jacobian.det_a() > 0 && found.margin > 0);
+        // The working mode is home's too: the inverse leads back.
+        if let Ok(back) = Wrist::PAPER.inverse(&found.rotation.to_pose()) {
+            for (a, b) in back.joints.0.into_iter().zip(joints.0) {
+                assert!(
+                    (radians(a) - radians(b)).abs() < 1e-6,
+                    "{joints:?} {back:?}"
+                );
+            }
+        }
+    }
+    println!(
+        "{answers} answers, {refusals} refusals, worst error {:.4} µrad",
+        worst * 1e6
+    );
+    assert!(answers > 10_000 && refusals > 10_000);
+    assert!(worst <= 0.1e-6, "{worst:e}");
+}
+
+#[test]
+fn maps_and_sharing_survive_every_input() {
+    let mut random = Random::new(0xA11B_1750_0000_0003);
+    let mut jacobians = 0;
+    while jacobians < 20_000 {
+        let raw = three(&mut random).map(|raw| raw >> (random.next() % 3));
+        let joints =
+            Joints([raw[0], raw[1], raw[2].saturating_add(421_657_428)].map(Angle::from_q29));
+        let Ok(direct) = Wrist::PAPER.direct(&joints) else {
+            continue;
+        };
+        jacobians += 1;
+        let jacobian = direct.jacobian;
+        let given = three(&mut random);
+        let rates = given.map(AngularVelocity::from_q24);
+        let moment = given.map(Torque::from_q24);
+        let _ = jacobian.motor_rates(rates);
+        let _ = jacobian.angular_velocity(rates);
+        let _ = jacobian.torques(moment);
+        let _ = jacobian.moment(moment);
+        let bounds = [(); 3].map(|()| Bounds {
+            low: Torque::from_q24(bits(&mut random)),
+            high: Torque::from_q24(bits(&mut random)),
+        });
+        let shared = jacobian.share(moment, &bounds);
+        for (torque, bound) in shared.torque.iter().zip(&bounds) {
+            assert!(
+                *torque >= bound.low.min(Torque::ZERO),
+                "{shared:?} {bounds:?}"
+            );
+            assert!(
+                *torque <= bound.high.max(Torque::ZERO),
+                "{shared:?} {bounds:?}"
+            );
+        }
+        for (achieved, asked) in shared.achieved.iter().zip(&moment) {
+            let (achieved, asked) = (i64::from(achieved.to_q24()), i64::from(asked.to_q24()));
+            assert!(achieved * asked.signum() >= 0 && achieved.abs() <= asked.abs());
+        }
+    }
+}
+
+#[test]
+fn poses_and_orientations_survive_every_input() {
+    let mut random = Random::new(0xA11B_1750_0000_0004);
+    let mut previous = Rotation::default();
+    for _ in 0..100_000 {
+        let [yaw, pitch, roll] = three(&mut random).map(Angle::from_q29);
+        let pose = Pose { yaw, pitch, roll };
+        let rotation = Rotation::from_pose(&pose);
+        let exact = exact_rotation(&pose);
+        assert!((matrix(&rotation) - exact).amax() <= 5e-9);
+        let _ = pose.angular_velocity(three(&mut random).map(AngularVelocity::from_q24));
+        let back = rotation.to_pose();
+        if back.pitch.abs() < Angle::from_milliradians(1_000) {
+            let turned = matrix(&Rotation::from_pose(&back));
+            assert!((turned - exact).amax() <= 16e-9, "{pose:?} {back:?}");
+        }
+        let error = previous.error_to(&rotation);
+        assert!(
+            error
+                .iter()
+                .all(|angle| f64::from(angle.to_q29()).abs() / Q29 <= 1.571)
+        );
+        previous = rotation;
+    }
+}
