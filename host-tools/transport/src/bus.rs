@@ -1,5 +1,6 @@
 //! A bus that frames go into and come out of, whatever it is made of.
 
+use std::path::Path;
 use std::time::Duration;
 
 use eel_protocol::Frame;
@@ -67,7 +68,7 @@ pub struct ErrorFrame {
 }
 
 /// Opens the bus that `url` names: `vcan0` or `can0` (SocketCAN, Linux only), a candump file
-/// (anything with a dot or a slash in it), or `-` for a candump recording on standard input.
+/// (what has a dot or a slash in it, or is a file), or `-` for a recording on standard input.
 ///
 /// # Errors
 /// An error that says what to do: no such interface, no such file, or a kind of bus that is not
@@ -83,7 +84,7 @@ pub fn open(url: &str) -> Result<Box<dyn Bus + Send>, BusError> {
                      candump file or - for standard input",
         });
     }
-    if url.contains(['.', '/', '\\']) {
+    if url.contains(['.', '/', '\\']) || Path::new(url).is_file() {
         return Ok(Box::new(FileBus::open(url)?));
     }
     open_interface(url)
