@@ -106,7 +106,7 @@ fn listen(
         listener.gather(statistics);
     }
     let seen = source::run(bus.as_mut(), limits, &mut listener)?;
-    let problems = listener.problems() + seen.malformed;
+    let problems = listener.problems() + seen.malformed + seen.dropped;
     if let Some(statistics) = listener.into_statistics() {
         report::write_table(&mut stderr().lock(), url, &statistics, &seen)?;
         return Ok(report::problems(&statistics, &seen));

@@ -11,8 +11,8 @@ use crate::stats::{PerId, Statistics};
 /// The schema, for `--help`.
 pub const SCHEMA: &str = "\
 One JSON object: bus (string), duration_s, frames, bits, load_percent, busiest_100ms_percent,
-malformed_lines, error_reports, problems (numbers; problems is the sum of bad, lost and repeated
-frames, gaps, fault emergencies, error reports and malformed lines), ids (array of id, extended, node
+malformed_lines, dropped (by the system), error_reports, problems (numbers; problems is the sum of bad, lost and repeated
+frames, gaps, fault emergencies, error reports, dropped frames and malformed lines), ids (array of id, extended, node
 or null, message or null, count, rate_hz or null, period_mean_ms, period_min_ms, period_max_ms,
 jitter_us (each null below two frames), load_percent, gaps, lost, repeated, bad), emergencies (array
 of time_s, node, code, name or null, severity or null, motor, limit, detail).";
@@ -26,6 +26,7 @@ struct Summary<'a> {
     load_percent: f64,
     busiest_100ms_percent: f64,
     malformed_lines: u64,
+    dropped: u64,
     error_reports: u64,
     problems: u64,
     ids: Vec<Row>,
@@ -103,7 +104,7 @@ impl Row {
 
 /// Returns everything that is wrong with a pass: the frames, and the lines that were none.
 pub fn problems(statistics: &Statistics, seen: &Seen) -> u64 {
-    statistics.problems() + seen.malformed
+    statistics.problems() + seen.malformed + seen.dropped
 }
 
 fn summary<'a>(bus: &'a str, statistics: &Statistics, seen: &Seen) -> Summary<'a> {
@@ -140,6 +141,7 @@ fn summary<'a>(bus: &'a str, statistics: &Statistics, seen: &Seen) -> Summary<'a
         load_percent: statistics.load_percent(),
         busiest_100ms_percent: statistics.busiest_percent(),
         malformed_lines: seen.malformed,
+        dropped: seen.dropped,
         error_reports: statistics.error_reports,
         problems: problems(statistics, seen),
         ids: rows.collect(),
@@ -203,6 +205,9 @@ pub fn write_table(
     writeln!(out)?;
     if summary.malformed_lines > 0 {
         writeln!(out, "{} lines could not be read", summary.malformed_lines)?;
+    }
+    if summary.dropped > 0 {
+        writeln!(out, "{} frames dropped by the system", summary.dropped)?;
     }
     if summary.error_reports > 0 {
         writeln!(

@@ -32,6 +32,8 @@ pub struct Seen {
     pub frames: u64,
     /// Lines that could not be read.
     pub malformed: u64,
+    /// Frames that the system dropped because we were too slow.
+    pub dropped: u64,
 }
 
 /// Something that takes what comes from a bus.
@@ -102,6 +104,13 @@ pub fn run(bus: &mut dyn Bus, limits: Limits, sink: &mut dyn Sink) -> Result<See
         }
     }
     sink.idle()?;
+    seen.dropped = bus.dropped();
+    if seen.dropped > 0 {
+        eprintln!(
+            "eel: {} frames dropped by the system: eel was too slow",
+            seen.dropped
+        );
+    }
     if seen.malformed > TOLD {
         eprintln!(
             "eel: {} malformed lines in all; --strict stops at the first",

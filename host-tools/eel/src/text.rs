@@ -144,11 +144,8 @@ impl Look {
         match (decoded.message, decoded.cob) {
             (Some(_), _) => Ok(()),
             _ if decoded.frame.is_remote() => {
-                write!(
-                    out,
-                    "  remote frame, asks for {} bytes",
-                    decoded.frame.length()
-                )
+                let (id, length) = (decoded.frame.raw_id(), decoded.frame.length());
+                write!(out, "  id 0x{id:X} remote frame, asks for {length} bytes")
             }
             (None, Some(Cob::SdoRequest(_))) => write!(
                 out,

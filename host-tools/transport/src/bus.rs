@@ -26,6 +26,12 @@ pub trait Bus {
     /// [`BusError::Ended`] once no frame can come any more, [`BusError::Line`] for a line of a file
     /// that can't be read (the next call goes on with the next line), and what the system says.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Received>, BusError>;
+
+    /// Returns how many frames the system has dropped because they were not received in time; it
+    /// is brought up to date by the next frame that arrives.
+    fn dropped(&self) -> u64 {
+        0
+    }
 }
 
 /// What came from a bus, and when.
