@@ -216,7 +216,7 @@ fn outline(spine: &[(f64, f64)], shape: &Shape) -> Vec<(f64, f64)> {
             } else {
                 (after, share - 0.5)
             };
-            let half = shape.half_axes(s + length * share).0;
+            let half = shape.half_span(s + length * share);
             let nx = here.0 + (other.0 - here.0) * weight;
             let ny = here.1 + (other.1 - here.1) * weight;
             let x = from.0 + (to.0 - from.0) * share;

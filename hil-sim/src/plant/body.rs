@@ -109,8 +109,9 @@ pub fn trailing_edge(config: &Config) -> Edge {
     let shape = &config.shape;
     let z = shape.length_m - shape.body_start(BODIES - 1);
     let density = config.water.map_or(0.0, |water| water.density_kg_m3);
+    let span = shape.half_span(shape.length_m);
     Edge {
-        vertical: density * PI * shape.edge_lateral_m * shape.edge_lateral_m,
+        vertical: density * PI * span * span,
         lateral: density * PI * shape.edge_vertical_m * shape.edge_vertical_m,
         z,
     }
@@ -139,10 +140,10 @@ fn solid(config: &Config, start: f64, end: f64) -> Body {
         // Second moments of the ellipse: ¼ of the mass times the squared half axis.
         let (about_x, about_y) = (0.25 * slice * a * a, 0.25 * slice * b * b);
         inertia.angular += Mat3::diagonal(about_x, about_y, about_x + about_y);
-        let water = stream * PI * h;
+        let (water, span) = (stream * PI * h, shape.half_span(s));
         inertia.add_point(
             Vec3::new(0.0, 0.0, z),
-            Mat3::diagonal(water * a * a, water * b * b, 0.0),
+            Mat3::diagonal(water * span * span, water * b * b, 0.0),
         );
         let flat = a * a - b * b;
         inertia.angular += Mat3::diagonal(0.0, 0.0, water * flat * flat / 8.0);
@@ -177,7 +178,11 @@ fn load(body: &mut Body, ballast: &Ballast, gravity: f64) {
 /// Returns Gauss–Legendre points (distance from the nose, weight): three on each piece of the
 /// outline, which integrates all sections of this shape exactly.
 fn slices(shape: &Shape, start: f64, end: f64) -> Vec<(f64, f64)> {
-    let cuts = [start, shape.nose_m, shape.length_m - shape.tail_m, end];
+    let (tail, fins) = (
+        shape.length_m - shape.tail_m,
+        shape.length_m - shape.fin_length_m,
+    );
+    let cuts = [start, shape.nose_m, tail, fins.max(tail), end];
     let mut points = Vec::new();
     for pair in cuts.windows(2) {
         let (low, high) = (pair[0].clamp(start, end), pair[1].clamp(start, end));
@@ -203,7 +208,7 @@ fn strips(shape: &Shape, water: &Water, start: f64, end: f64, count: usize) -> V
         let cross = half_density * water.cross_drag * h;
         Strip {
             z,
-            vertical: cross * 2.0 * a,
+            vertical: cross * 2.0 * shape.half_span(start + z),
             lateral: cross * 2.0 * b,
             skin: half_density * water.skin_friction * perimeter(a, b) * h,
             roll: half_density * 0.5 * (b * b - a * a).abs() * b * b * h,
@@ -227,8 +232,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_eel_weighs_what_its_water_weighs() {
-        let bodies = cut(&Config::default());
+    fn the_eel_weighs_what_its_water_weighs() {
+        let bodies = cut(&Config::bare());
         let mass: f64 = bodies.iter().map(|body| body.mass_kg).sum();
         assert!((mass - 15.107).abs() < 0.001, "{mass} kg");
         for body in &bodies {

@@ -45,7 +45,7 @@ impl Check {
 
 /// Runs all checks.
 pub fn all() -> Vec<Check> {
-    vec![p1(), p2(), p3(), p4(), p6(), p7(), p8(), p9(), p10()]
+    vec![p1(), p2(), p3(), p4(), p5(), p6(), p7(), p8(), p9(), p10()]
 }
 
 /// P1: the dry free chain keeps its energy over 5 s (Runge–Kutta, 1 ms).
@@ -93,7 +93,7 @@ pub fn p2() -> Check {
         step_s: 0.5e-3,
         water: None,
         gravity_m_s2: 0.0,
-        ..Config::default()
+        ..Config::bare()
     };
     let mut plant = Plant::new(&config, 1);
     let state = plant.state_mut();
@@ -145,7 +145,7 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// P3: a locked eel answers a sudden force with a = F/(m + mₐ), mₐ from the integrals of ρπb²
-/// (lateral), ρπa² (vertical) and nothing (along the body), done by hand for the default outline.
+/// (lateral), ρπa² (vertical) and nothing (along the body), done by hand for the bare outline.
 pub fn p3() -> Check {
     let shape = Shape::default();
     let (nose, trunk, tail) = (
@@ -159,7 +159,7 @@ pub fn p3() -> Check {
     };
     let lateral = added(shape.vertical_m, shape.edge_vertical_m);
     let vertical = added(shape.lateral_m, shape.edge_lateral_m);
-    let mass = Plant::new(&Config::default(), 1).mass_kg();
+    let mass = Plant::new(&Config::bare(), 1).mass_kg();
     let axes = [
         (Vec3::new(1.0, 0.0, 0.0), mass + vertical),
         (Vec3::new(0.0, 1.0, 0.0), mass + lateral),
@@ -184,7 +184,7 @@ fn sudden(axis: Vec3, force_n: f64) -> f64 {
     let config = Config {
         locked: true,
         step_s: 1e-4,
-        ..Config::default()
+        ..Config::bare()
     };
     let answer = |z: f64| {
         let mut plant = Plant::new(&config, 1);
@@ -232,6 +232,28 @@ pub fn p4() -> Check {
         worst = larger(worst, (-plant.state().velocity.0[2] / expected - 1.0).abs());
     }
     Check::new("P4 error of the straight glide over 10 s", worst, 5e-3, "1")
+}
+
+/// P5: the stride hardly depends on the frequency, 0.25 to 1.5 Hz: the spread over its mean.
+pub fn p5() -> Check {
+    let stride = |frequency_hz: f64| {
+        let wave = Wave {
+            frequency_hz,
+            ..Wave::default()
+        };
+        let swim = reference_swim(&Config::default(), &wave, 30.0);
+        swim.map_or(f64::NAN, |swim| swim.figures.stride_body_lengths)
+    };
+    let strides = [0.25, 0.5, 1.0, 1.5].map(stride);
+    let most = strides.into_iter().fold(0.0, larger);
+    let least = strides.into_iter().fold(f64::INFINITY, f64::min);
+    let spread = (most - least) / (0.5 * (most + least));
+    Check::new(
+        "P5 spread of the stride over 0.25 to 1.5 Hz",
+        spread,
+        0.015,
+        "1",
+    )
 }
 
 /// P6: what the joints put in is what the water takes and the motion keeps, over a swim.
@@ -399,6 +421,11 @@ mod tests {
     #[test]
     fn a_straight_glide_slows_as_the_formula_says() {
         demand(&p4());
+    }
+
+    #[test]
+    fn the_stride_hardly_depends_on_the_frequency() {
+        demand(&p5());
     }
 
     #[test]

@@ -7,7 +7,10 @@ use super::transmission::Transmission;
 /// The shape, the water, the motors and the simulation step of one eel.
 ///
 /// The default is the prototype eel: ten joints every 0.1 m from 0.3 m to 1.2 m, 1.5 m long,
-/// neutrally buoyant, in fresh water at rest.
+/// neutrally buoyant, in fresh water at rest; with two small fins at the tail and its mass 5 mm
+/// low. Without these, [`Config::bare`], nothing holds pitch and roll: on paper the bare eel swims
+/// straight, but any tilt against its path grows by a factor of about 16 in 4 s (the Munk moment of
+/// a body that ends in a vertical edge).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Time that one step advances, s.
@@ -61,6 +64,10 @@ pub struct Shape {
     pub edge_lateral_m: f64,
     /// Vertical half axis at the trailing edge.
     pub edge_vertical_m: f64,
+    /// Half span of the horizontal fins at the trailing edge; no wider than the tail for none.
+    pub fin_m: f64,
+    /// Length over which the fins grow from nothing.
+    pub fin_length_m: f64,
     /// Distance of the first joint from the nose.
     pub first_joint_m: f64,
     /// Distance between joints.
@@ -132,7 +139,7 @@ impl Default for Config {
             water: Some(Water::default()),
             gravity_m_s2: 9.81,
             density_kg_m3: 1000.0,
-            centre_of_mass_drop_m: 0.0,
+            centre_of_mass_drop_m: 0.005,
             ballast: None,
             locked: false,
             strips_per_body: 5,
@@ -147,6 +154,19 @@ impl Default for Config {
     }
 }
 
+impl Config {
+    /// Returns the prototype without fins and with its mass in the middle, for comparison with
+    /// formulas and with figures of swims in the plane.
+    pub fn bare() -> Self {
+        let mut config = Self {
+            centre_of_mass_drop_m: 0.0,
+            ..Self::default()
+        };
+        config.shape.fin_m = 0.0;
+        config
+    }
+}
+
 impl Default for Shape {
     fn default() -> Self {
         Self {
@@ -157,6 +177,8 @@ impl Default for Shape {
             tail_m: 0.25,
             edge_lateral_m: 0.004,
             edge_vertical_m: 0.045,
+            fin_m: 0.05,
+            fin_length_m: 0.10,
             first_joint_m: 0.30,
             joint_pitch_m: 0.10,
         }
@@ -180,6 +202,13 @@ impl Shape {
         } else {
             (self.lateral_m, self.vertical_m)
         }
+    }
+
+    /// Returns the lateral half span, m, that vertical flow meets at a distance `s` from the nose:
+    /// that of the body or of the fins, whichever is wider.
+    pub fn half_span(&self, s: f64) -> f64 {
+        let share = 1.0 - (self.length_m - s) / self.fin_length_m;
+        self.half_axes(s).0.max(self.fin_m * share)
     }
 
     /// Returns the distance from the nose, m, at which body `body` begins, 0 (head) to 11 (the
