@@ -189,581 +189,127 @@ const fn sub(
     }
 }
 
-/// Each entry of the dictionary, as the thing that a vertebra serves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Field {
-    /// Angle about x, swimming, that the vertebra shall take.
-    TargetYaw,
-    /// Angle about y, diving, that the vertebra shall take.
-    TargetPitch,
-    /// Angle about z, torsion, that the vertebra shall take.
-    TargetRoll,
-    /// Mode in the low four bits, counter 0-14 in the high four.
-    TargetCode,
-    /// Protection byte over the seven bytes before it and the COB-ID.
-    TargetCrc,
-    /// Moment about x of the base, that is added to the controller's.
-    MomentX,
-    /// Moment about y of the base, that is added to the controller's.
-    MomentY,
-    /// Moment about z of the base, that is added to the controller's.
-    MomentZ,
-    /// Scale of the configured stiffness: 1 at power-up, 2 at most.
-    MomentStiffness,
-    /// Measured angle about x, swimming.
-    PoseYaw,
-    /// Measured angle about y, diving.
-    PosePitch,
-    /// Measured angle about z, torsion.
-    PoseRoll,
-    /// State in the low four bits, counter 0-14 in the high four.
-    PoseCode,
-    /// Protection byte over the seven bytes before it and the COB-ID.
-    PoseCrc,
-    /// Status word: why enabling is refused, and what is limited.
-    PoseStatus,
-    /// Torque of motor 1, from its current.
-    EffortMotor1,
-    /// Torque of motor 2, from its current.
-    EffortMotor2,
-    /// Torque of motor 3, from its current.
-    EffortMotor3,
-    /// Limit codes of motors 1-3, four bits each, and four flags above.
-    EffortLimits,
-    /// Angle of motor 1's crank.
-    MotorAngle1,
-    /// Angle of motor 2's crank.
-    MotorAngle2,
-    /// Angle of motor 3, the serial leg; 45 degrees at home.
-    MotorAngle3,
-    /// Moment about x that the motors produce.
-    AchievedX,
-    /// Moment about y that the motors produce.
-    AchievedY,
-    /// Moment about z that the motors produce.
-    AchievedZ,
-    /// Moment about x that was asked for and is not produced.
-    UnallocatedX,
-    /// Moment about y that was asked for and is not produced.
-    UnallocatedY,
-    /// Moment about z that was asked for and is not produced.
-    UnallocatedZ,
-    /// Stiffness about x, swimming.
-    StiffnessX,
-    /// Stiffness about y, diving.
-    StiffnessY,
-    /// Stiffness about z, torsion.
-    StiffnessZ,
-    /// Damping about x, swimming.
-    DampingX,
-    /// Damping about y, diving.
-    DampingY,
-    /// Damping about z, torsion.
-    DampingZ,
-    /// Largest torque of each motor.
-    PeakTorque,
-    /// Workspace: largest yaw to either side, 30 degrees.
-    RangeYaw,
-    /// Workspace: largest pitch to either side, 15 degrees.
-    RangePitch,
-    /// Workspace: largest roll to either side, 4 degrees.
-    RangeRoll,
-    /// Fastest change of a target's angle that is followed.
-    RateLimit,
-    /// Kind of wrist: 1 parallel axes, 2 orthogonal axes, 3 parallel actuators.
-    Architecture,
-    /// Length of the unit mechanism's 1, the rods.
-    GeometryScale,
-    /// Supply voltage of the bridges.
-    Supply,
-    /// Temperature of the board.
-    BoardTemperature,
-    /// Housing temperature of motor 1.
-    MotorTemperature1,
-    /// Housing temperature of motor 2.
-    MotorTemperature2,
-    /// Housing temperature of motor 3.
-    MotorTemperature3,
-    /// Targets refused since power-up: wrong protection byte, mode or counter.
-    BadTargets,
-    /// Targets missed since power-up, by gaps in their counter.
-    LostTargets,
-    /// Frames lost since power-up because a receive queue was full.
-    ReceiveOverruns,
-    /// Frames dropped since power-up because a transmit queue was full.
-    TransmitOverruns,
-    /// Time that the last control tick took.
-    LoopLast,
-    /// Longest time that a control tick took since power-up.
-    LoopMax,
-    /// Arrival of the last SYNC against the control tick's own grid.
-    SyncPhase,
+/// Defines the fields, the entries and the records from one list.
+macro_rules! records {
+    ($($record:ident = $index:literal $name:literal, $meaning:literal {
+        $($subindex:literal $field:ident $entry:literal $shape:expr, $description:literal;)*
+    })*) => {
+        /// Each entry of the dictionary, as the thing that a vertebra serves.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Field {
+            $($(#[doc = $description] $field,)*)*
+        }
+
+        $(const $record: &[Sub] =
+            &[$(sub(Field::$field, $subindex, $entry, $shape, $description),)*];)*
+
+        /// Every record of a vertebra's dictionary, by rising index.
+        pub const OBJECTS: &[Object] = &[
+            $(Object { index: $index, name: $name, description: $meaning, subs: $record },)*
+        ];
+    };
 }
 
-const TARGET: &[Sub] = &[
-    sub(
-        Field::TargetYaw,
-        1,
-        "yaw",
-        angle(RW, RX),
-        "Angle about x, swimming, that the vertebra shall take.",
-    ),
-    sub(
-        Field::TargetPitch,
-        2,
-        "pitch",
-        angle(RW, RX),
-        "Angle about y, diving, that the vertebra shall take.",
-    ),
-    sub(
-        Field::TargetRoll,
-        3,
-        "roll",
-        angle(RW, RX),
-        "Angle about z, torsion, that the vertebra shall take.",
-    ),
-    sub(
-        Field::TargetCode,
-        4,
-        "code",
-        byte(RW, RX),
-        "Mode in the low four bits, counter 0-14 in the high four.",
-    ),
-    sub(
-        Field::TargetCrc,
-        5,
-        "crc",
-        byte(RW, RX),
-        "Protection byte over the seven bytes before it and the COB-ID.",
-    ),
-];
-
-const MOMENT: &[Sub] = &[
-    sub(
-        Field::MomentX,
-        1,
-        "x",
-        torque(RW, RX),
-        "Moment about x of the base, that is added to the controller's.",
-    ),
-    sub(
-        Field::MomentY,
-        2,
-        "y",
-        torque(RW, RX),
-        "Moment about y of the base, that is added to the controller's.",
-    ),
-    sub(
-        Field::MomentZ,
-        3,
-        "z",
-        torque(RW, RX),
-        "Moment about z of the base, that is added to the controller's.",
-    ),
-    sub(
-        Field::MomentStiffness,
-        4,
-        "stiffness",
-        STIFFNESS_SCALE,
-        "Scale of the configured stiffness: 1 at power-up, 2 at most.",
-    ),
-];
-
-const POSE: &[Sub] = &[
-    sub(
-        Field::PoseYaw,
-        1,
-        "yaw",
-        angle(RO, TX),
-        "Measured angle about x, swimming.",
-    ),
-    sub(
-        Field::PosePitch,
-        2,
-        "pitch",
-        angle(RO, TX),
-        "Measured angle about y, diving.",
-    ),
-    sub(
-        Field::PoseRoll,
-        3,
-        "roll",
-        angle(RO, TX),
-        "Measured angle about z, torsion.",
-    ),
-    sub(
-        Field::PoseCode,
-        4,
-        "code",
-        byte(RO, TX),
-        "State in the low four bits, counter 0-14 in the high four.",
-    ),
-    sub(
-        Field::PoseCrc,
-        5,
-        "crc",
-        byte(RO, TX),
-        "Protection byte over the seven bytes before it and the COB-ID.",
-    ),
-    sub(
-        Field::PoseStatus,
-        6,
-        "status",
-        word(RO, TX),
-        "Status word: why enabling is refused, and what is limited.",
-    ),
-];
-
-const EFFORT: &[Sub] = &[
-    sub(
-        Field::EffortMotor1,
-        1,
-        "motor1",
-        torque(RO, TX),
-        "Torque of motor 1, from its current.",
-    ),
-    sub(
-        Field::EffortMotor2,
-        2,
-        "motor2",
-        torque(RO, TX),
-        "Torque of motor 2, from its current.",
-    ),
-    sub(
-        Field::EffortMotor3,
-        3,
-        "motor3",
-        torque(RO, TX),
-        "Torque of motor 3, from its current.",
-    ),
-    sub(
-        Field::EffortLimits,
-        4,
-        "limits",
-        word(RO, TX),
-        "Limit codes of motors 1-3, four bits each, and four flags above.",
-    ),
-];
-
-const MOTOR: &[Sub] = &[
-    sub(
-        Field::MotorAngle1,
-        1,
-        "angle1",
-        MICRORADIANS,
-        "Angle of motor 1's crank.",
-    ),
-    sub(
-        Field::MotorAngle2,
-        2,
-        "angle2",
-        MICRORADIANS,
-        "Angle of motor 2's crank.",
-    ),
-    sub(
-        Field::MotorAngle3,
-        3,
-        "angle3",
-        MICRORADIANS,
-        "Angle of motor 3, the serial leg; 45 degrees at home.",
-    ),
-];
-
-const ALLOCATION: &[Sub] = &[
-    sub(
-        Field::AchievedX,
-        1,
-        "achieved_x",
-        torque(RO, TX),
-        "Moment about x that the motors produce.",
-    ),
-    sub(
-        Field::AchievedY,
-        2,
-        "achieved_y",
-        torque(RO, TX),
-        "Moment about y that the motors produce.",
-    ),
-    sub(
-        Field::AchievedZ,
-        3,
-        "achieved_z",
-        torque(RO, TX),
-        "Moment about z that the motors produce.",
-    ),
-    sub(
-        Field::UnallocatedX,
-        4,
-        "unallocated_x",
-        torque(RO, TX),
-        "Moment about x that was asked for and is not produced.",
-    ),
-    sub(
-        Field::UnallocatedY,
-        5,
-        "unallocated_y",
-        torque(RO, TX),
-        "Moment about y that was asked for and is not produced.",
-    ),
-    sub(
-        Field::UnallocatedZ,
-        6,
-        "unallocated_z",
-        torque(RO, TX),
-        "Moment about z that was asked for and is not produced.",
-    ),
-];
-
-const GAINS: &[Sub] = &[
-    sub(
-        Field::StiffnessX,
-        1,
-        "stiffness_x",
-        stiffness(120_000),
-        "Stiffness about x, swimming.",
-    ),
-    sub(
-        Field::StiffnessY,
-        2,
-        "stiffness_y",
-        stiffness(120_000),
-        "Stiffness about y, diving.",
-    ),
-    sub(
-        Field::StiffnessZ,
-        3,
-        "stiffness_z",
-        stiffness(80_000),
-        "Stiffness about z, torsion.",
-    ),
-    sub(
-        Field::DampingX,
-        4,
-        "damping_x",
-        damping(4_000),
-        "Damping about x, swimming.",
-    ),
-    sub(
-        Field::DampingY,
-        5,
-        "damping_y",
-        damping(4_000),
-        "Damping about y, diving.",
-    ),
-    sub(
-        Field::DampingZ,
-        6,
-        "damping_z",
-        damping(2_000),
-        "Damping about z, torsion.",
-    ),
-    sub(
-        Field::PeakTorque,
-        7,
-        "peak_torque",
-        PEAK_TORQUE,
-        "Largest torque of each motor.",
-    ),
-    sub(
-        Field::RangeYaw,
-        8,
-        "range_yaw",
-        half_range(5_236),
-        "Workspace: largest yaw to either side, 30 degrees.",
-    ),
-    sub(
-        Field::RangePitch,
-        9,
-        "range_pitch",
-        half_range(2_618),
-        "Workspace: largest pitch to either side, 15 degrees.",
-    ),
-    sub(
-        Field::RangeRoll,
-        10,
-        "range_roll",
-        half_range(698),
-        "Workspace: largest roll to either side, 4 degrees.",
-    ),
-    sub(
-        Field::RateLimit,
-        11,
-        "rate_limit",
-        RATE_LIMIT,
-        "Fastest change of a target's angle that is followed.",
-    ),
-];
-
-const GEOMETRY: &[Sub] = &[
-    sub(
-        Field::Architecture,
-        1,
-        "architecture",
-        ARCHITECTURE,
-        "Kind of wrist: 1 parallel axes, 2 orthogonal axes, 3 parallel actuators.",
-    ),
-    sub(
-        Field::GeometryScale,
-        2,
-        "scale",
-        SCALE,
-        "Length of the unit mechanism's 1, the rods.",
-    ),
-];
-
-const HEALTH: &[Sub] = &[
-    sub(
-        Field::Supply,
-        1,
-        "supply",
-        SUPPLY,
-        "Supply voltage of the bridges.",
-    ),
-    sub(
-        Field::BoardTemperature,
-        2,
-        "board_temperature",
-        TEMPERATURE,
-        "Temperature of the board.",
-    ),
-    sub(
-        Field::MotorTemperature1,
-        3,
-        "motor1_temperature",
-        TEMPERATURE,
-        "Housing temperature of motor 1.",
-    ),
-    sub(
-        Field::MotorTemperature2,
-        4,
-        "motor2_temperature",
-        TEMPERATURE,
-        "Housing temperature of motor 2.",
-    ),
-    sub(
-        Field::MotorTemperature3,
-        5,
-        "motor3_temperature",
-        TEMPERATURE,
-        "Housing temperature of motor 3.",
-    ),
-    sub(
-        Field::BadTargets,
-        6,
-        "bad_targets",
-        COUNT,
-        "Targets refused since power-up: wrong protection byte, mode or counter.",
-    ),
-    sub(
-        Field::LostTargets,
-        7,
-        "lost_targets",
-        COUNT,
-        "Targets missed since power-up, by gaps in their counter.",
-    ),
-    sub(
-        Field::ReceiveOverruns,
-        8,
-        "receive_overruns",
-        COUNT,
-        "Frames lost since power-up because a receive queue was full.",
-    ),
-    sub(
-        Field::TransmitOverruns,
-        9,
-        "transmit_overruns",
-        COUNT,
-        "Frames dropped since power-up because a transmit queue was full.",
-    ),
-];
-
-const TIMING: &[Sub] = &[
-    sub(
-        Field::LoopLast,
-        1,
-        "loop_last",
-        MICROSECONDS,
-        "Time that the last control tick took.",
-    ),
-    sub(
-        Field::LoopMax,
-        2,
-        "loop_max",
-        MICROSECONDS,
-        "Longest time that a control tick took since power-up.",
-    ),
-    sub(
-        Field::SyncPhase,
-        3,
-        "sync_phase",
-        SYNC_PHASE,
-        "Arrival of the last SYNC against the control tick's own grid.",
-    ),
-];
-
-/// Every record of a vertebra's dictionary, by rising index.
-pub const OBJECTS: &[Object] = &[
-    Object {
-        index: 0x2000,
-        name: "target",
-        description: "What the head asks of the vertebra; RPDO1.",
-        subs: TARGET,
-    },
-    Object {
-        index: 0x2001,
-        name: "moment",
-        description: "Feed-forward moment and stiffness scale; RPDO2.",
-        subs: MOMENT,
-    },
-    Object {
-        index: 0x2010,
-        name: "pose",
-        description: "What the vertebra does; TPDO1.",
-        subs: POSE,
-    },
-    Object {
-        index: 0x2011,
-        name: "effort",
-        description: "Torques of the motors and what bounds them; TPDO2.",
-        subs: EFFORT,
-    },
-    Object {
-        index: 0x2012,
-        name: "motor",
-        description: "Angles of the motors.",
-        subs: MOTOR,
-    },
-    Object {
-        index: 0x2013,
-        name: "allocation",
-        description: "What torque sharing could produce of the moment asked for.",
-        subs: ALLOCATION,
-    },
-    Object {
-        index: 0x2020,
-        name: "gains",
-        description: "Gains and limits of the controller; may be changed while the wrist is off.",
-        subs: GAINS,
-    },
-    Object {
-        index: 0x2021,
-        name: "geometry",
-        description: "The wrist that the kinematics are made for.",
-        subs: GEOMETRY,
-    },
-    Object {
-        index: 0x2030,
-        name: "health",
-        description: "Supply, temperatures and counters.",
-        subs: HEALTH,
-    },
-    Object {
-        index: 0x2040,
-        name: "timing",
-        description: "The control loop's time and the beat of the bus.",
-        subs: TIMING,
-    },
-];
+records! {
+    TARGET = 0x2000 "target", "What the head asks of the vertebra; RPDO1." {
+        1 TargetYaw "yaw" angle(RW, RX), "Angle about x, swimming, that the vertebra shall take.";
+        2 TargetPitch "pitch" angle(RW, RX), "Angle about y, diving, that the vertebra shall take.";
+        3 TargetRoll "roll" angle(RW, RX), "Angle about z, torsion, that the vertebra shall take.";
+        4 TargetCode "code" byte(RW, RX),
+            "Mode in the low four bits, counter 0-14 in the high four.";
+        5 TargetCrc "crc" byte(RW, RX),
+            "Protection byte over the seven bytes before it and the COB-ID.";
+    }
+    MOMENT = 0x2001 "moment", "Feed-forward moment and stiffness scale; RPDO2." {
+        1 MomentX "x" torque(RW, RX),
+            "Moment about x of the base, that is added to the controller's.";
+        2 MomentY "y" torque(RW, RX),
+            "Moment about y of the base, that is added to the controller's.";
+        3 MomentZ "z" torque(RW, RX),
+            "Moment about z of the base, that is added to the controller's.";
+        4 MomentStiffness "stiffness" STIFFNESS_SCALE,
+            "Scale of the configured stiffness: 1 at power-up, 2 at most.";
+    }
+    POSE = 0x2010 "pose", "What the vertebra does; TPDO1." {
+        1 PoseYaw "yaw" angle(RO, TX), "Measured angle about x, swimming.";
+        2 PosePitch "pitch" angle(RO, TX), "Measured angle about y, diving.";
+        3 PoseRoll "roll" angle(RO, TX), "Measured angle about z, torsion.";
+        4 PoseCode "code" byte(RO, TX),
+            "State in the low four bits, counter 0-14 in the high four.";
+        5 PoseCrc "crc" byte(RO, TX),
+            "Protection byte over the seven bytes before it and the COB-ID.";
+        6 PoseStatus "status" word(RO, TX),
+            "Status word: why enabling is refused, and what is limited.";
+    }
+    EFFORT = 0x2011 "effort", "Torques of the motors and what bounds them; TPDO2." {
+        1 EffortMotor1 "motor1" torque(RO, TX), "Torque of motor 1, from its current.";
+        2 EffortMotor2 "motor2" torque(RO, TX), "Torque of motor 2, from its current.";
+        3 EffortMotor3 "motor3" torque(RO, TX), "Torque of motor 3, from its current.";
+        4 EffortLimits "limits" word(RO, TX),
+            "Limit codes of motors 1-3, four bits each, and four flags above.";
+    }
+    MOTOR = 0x2012 "motor", "Angles of the motors." {
+        1 MotorAngle1 "angle1" MICRORADIANS, "Angle of motor 1's crank.";
+        2 MotorAngle2 "angle2" MICRORADIANS, "Angle of motor 2's crank.";
+        3 MotorAngle3 "angle3" MICRORADIANS,
+            "Angle of motor 3, the serial leg; 45 degrees at home.";
+    }
+    ALLOCATION = 0x2013 "allocation", "What torque sharing could produce of the moment asked for." {
+        1 AchievedX "achieved_x" torque(RO, TX), "Moment about x that the motors produce.";
+        2 AchievedY "achieved_y" torque(RO, TX), "Moment about y that the motors produce.";
+        3 AchievedZ "achieved_z" torque(RO, TX), "Moment about z that the motors produce.";
+        4 UnallocatedX "unallocated_x" torque(RO, TX),
+            "Moment about x that was asked for and is not produced.";
+        5 UnallocatedY "unallocated_y" torque(RO, TX),
+            "Moment about y that was asked for and is not produced.";
+        6 UnallocatedZ "unallocated_z" torque(RO, TX),
+            "Moment about z that was asked for and is not produced.";
+    }
+    GAINS = 0x2020 "gains",
+        "Gains and limits of the controller; may be changed while the wrist is off." {
+        1 StiffnessX "stiffness_x" stiffness(120_000), "Stiffness about x, swimming.";
+        2 StiffnessY "stiffness_y" stiffness(120_000), "Stiffness about y, diving.";
+        3 StiffnessZ "stiffness_z" stiffness(80_000), "Stiffness about z, torsion.";
+        4 DampingX "damping_x" damping(4_000), "Damping about x, swimming.";
+        5 DampingY "damping_y" damping(4_000), "Damping about y, diving.";
+        6 DampingZ "damping_z" damping(2_000), "Damping about z, torsion.";
+        7 PeakTorque "peak_torque" PEAK_TORQUE, "Largest torque of each motor.";
+        8 RangeYaw "range_yaw" half_range(5_236),
+            "Workspace: largest yaw to either side, 30 degrees.";
+        9 RangePitch "range_pitch" half_range(2_618),
+            "Workspace: largest pitch to either side, 15 degrees.";
+        10 RangeRoll "range_roll" half_range(698),
+            "Workspace: largest roll to either side, 4 degrees.";
+        11 RateLimit "rate_limit" RATE_LIMIT,
+            "Fastest change of a target's angle that is followed.";
+    }
+    GEOMETRY = 0x2021 "geometry", "The wrist that the kinematics are made for." {
+        1 Architecture "architecture" ARCHITECTURE,
+            "Kind of wrist: 1 parallel axes, 2 orthogonal axes, 3 parallel actuators.";
+        2 GeometryScale "scale" SCALE, "Length of the unit mechanism's 1, the rods.";
+    }
+    HEALTH = 0x2030 "health", "Supply, temperatures and counters." {
+        1 Supply "supply" SUPPLY, "Supply voltage of the bridges.";
+        2 BoardTemperature "board_temperature" TEMPERATURE, "Temperature of the board.";
+        3 MotorTemperature1 "motor1_temperature" TEMPERATURE, "Housing temperature of motor 1.";
+        4 MotorTemperature2 "motor2_temperature" TEMPERATURE, "Housing temperature of motor 2.";
+        5 MotorTemperature3 "motor3_temperature" TEMPERATURE, "Housing temperature of motor 3.";
+        6 BadTargets "bad_targets" COUNT,
+            "Targets refused since power-up: wrong protection byte, mode or counter.";
+        7 LostTargets "lost_targets" COUNT,
+            "Targets missed since power-up, by gaps in their counter.";
+        8 ReceiveOverruns "receive_overruns" COUNT,
+            "Frames lost since power-up because a receive queue was full.";
+        9 TransmitOverruns "transmit_overruns" COUNT,
+            "Frames dropped since power-up because a transmit queue was full.";
+    }
+    TIMING = 0x2040 "timing", "The control loop's time and the beat of the bus." {
+        1 LoopLast "loop_last" MICROSECONDS, "Time that the last control tick took.";
+        2 LoopMax "loop_max" MICROSECONDS, "Longest time that a control tick took since power-up.";
+        3 SyncPhase "sync_phase" SYNC_PHASE,
+            "Arrival of the last SYNC against the control tick's own grid.";
+    }
+}
 
 impl Field {
     /// Returns the entry that the field serves, for its default, bounds and scale.
