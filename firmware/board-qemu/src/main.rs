@@ -1,26 +1,20 @@
-//! In the making.
+//! The same vertebra on a Cortex-M4 in QEMU (`-M netduinoplus2`), in lock-step with a world outside.
+//!
+//! The image reads packets of [`eel_vertebra::lockstep`] from the file or pipe `lockstep.in` in
+//! QEMU's folder and writes its answers to `lockstep.out`, over semihosting; at the end of the input
+//! it says how many instructions its turns took and leaves. It has no clock, no bus and no plant of
+//! its own, and decides nothing.
 #![cfg_attr(target_os = "none", no_std, no_main)]
-#[cfg(not(target_os = "none"))]
-fn main() {}
 
 #[cfg(target_os = "none")]
-mod image {
-    use core::fmt::Write;
-    use cortex_m_rt::entry;
-    use cortex_m_semihosting::{debug, hio};
-    #[entry]
-    fn main() -> ! {
-        if let Ok(mut out) = hio::hstdout() {
-            let _ = out.write_str("hello\n");
-        }
-        loop {
-            debug::exit(debug::EXIT_SUCCESS);
-        }
-    }
-    #[panic_handler]
-    fn panic(_: &core::panic::PanicInfo) -> ! {
-        loop {
-            debug::exit(debug::EXIT_FAILURE);
-        }
-    }
+mod image;
+#[cfg(target_os = "none")]
+mod meter;
+#[cfg(target_os = "none")]
+mod pipe;
+
+/// Says what to do: the image only runs in QEMU.
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("cargo xtask firmware qemu && cargo test -p eel-tests --test qemu");
 }

@@ -1,0 +1,127 @@
+//! The loop: a packet in, a turn, a packet out.
+
+use core::fmt::Write;
+use core::panic::PanicInfo;
+
+use cortex_m_semihosting::{debug, hio};
+use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
+use eel_vertebra::{Settings, Vertebra, turn};
+
+use crate::meter::Meter;
+use crate::pipe::{Broken, Pipe};
+
+/// Why the image gave up.
+#[derive(Debug)]
+enum Failure {
+    /// A pipe broke.
+    Pipe,
+    /// The input is no packet.
+    Packet,
+    /// The packet has no place here.
+    Order,
+}
+
+impl From<Broken> for Failure {
+    fn from(_: Broken) -> Self {
+        Self::Pipe
+    }
+}
+
+impl From<lockstep::PacketError> for Failure {
+    fn from(_: lockstep::PacketError) -> Self {
+        Self::Packet
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let status = match run() {
+        Ok(()) => debug::EXIT_SUCCESS,
+        Err(failure) => {
+            say(format_args!("{failure:?}"));
+            debug::EXIT_FAILURE
+        }
+    };
+    leave(status)
+}
+
+/// Takes turns until the input ends.
+fn run() -> Result<(), Failure> {
+    let peripherals = cortex_m::Peripherals::take().ok_or(Failure::Order)?;
+    let mut meter = Meter::new(peripherals.SYST);
+    let mut input = Pipe::open(c"lockstep.in")?;
+    let mut output = Pipe::create(c"lockstep.out")?;
+    let mut vertebra = None;
+    let mut body = [0; MAX_PACKET - HEADER];
+    loop {
+        let mut header = [0; HEADER];
+        if !input.fill(&mut header)? {
+            break;
+        }
+        let Header { kind, length } = Header::decode(header)?;
+        let body = body.get_mut(..length).ok_or(Failure::Packet)?;
+        if !body.is_empty() && !input.fill(body)? {
+            return Err(Failure::Pipe);
+        }
+        match (kind, &mut vertebra) {
+            (Kind::Start, _) => {
+                let lockstep::Start { node, serial, now } = lockstep::Start::decode(body)?;
+                vertebra = Some(Vertebra::new(Settings::prototype(node, serial), now));
+            }
+            (Kind::Input, Some(vertebra)) => {
+                let given = lockstep::Input::decode(body)?;
+                let made = meter.count(|| answer(vertebra, given));
+                output.write_all(made.encode().as_bytes())?;
+            }
+            (Kind::Input, None) | (Kind::Output, _) => return Err(Failure::Order),
+        }
+    }
+    let taken = meter.read();
+    say(format_args!(
+        "{} turns, instructions a turn: {} mean, {} worst",
+        taken.turns, taken.mean, taken.worst
+    ));
+    Ok(())
+}
+
+/// Does one turn.
+fn answer(vertebra: &mut Vertebra, given: lockstep::Input) -> lockstep::Output {
+    let mut frames = Frames::new();
+    let mut lost = 0_u8;
+    let lockstep::Input {
+        now,
+        sample,
+        frames: heard,
+    } = given;
+    let drives = turn(vertebra, now, heard, &sample, |frame| {
+        if frames.push(frame).is_err() {
+            lost = lost.saturating_add(1);
+        }
+    });
+    lockstep::Output {
+        drives,
+        frames,
+        lost,
+    }
+}
+
+/// Writes a line to QEMU's output.
+fn say(words: core::fmt::Arguments<'_>) {
+    if let Ok(mut out) = hio::hstdout() {
+        // Nobody is left to tell where this fails.
+        let _ = writeln!(out, "{words}");
+    }
+}
+
+/// Ends QEMU.
+fn leave(status: debug::ExitStatus) -> ! {
+    loop {
+        debug::exit(status);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    say(format_args!("{info}"));
+    leave(debug::EXIT_FAILURE)
+}
