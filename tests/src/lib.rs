@@ -1,1 +1,1 @@
-//! In the making.
+//! The tests are in `tests/`, one target for each way of running.

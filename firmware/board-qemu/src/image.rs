@@ -93,7 +93,7 @@ fn answer(vertebra: &mut Vertebra, given: lockstep::Input) -> lockstep::Output {
         sample,
         frames: heard,
     } = given;
-    let drives = turn(vertebra, now, heard, &sample, |frame| {
+    let drives = turn(vertebra, now, heard.iter().copied(), &sample, |frame| {
         if frames.push(frame).is_err() {
             lost = lost.saturating_add(1);
         }

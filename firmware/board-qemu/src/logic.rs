@@ -9,7 +9,8 @@ mod image {
     use core::hint::black_box;
     use core::panic::PanicInfo;
 
-    use eel_protocol::NodeId;
+    use eel_head::{Config, Gait, Head, Plane};
+    use eel_protocol::{Frame, NodeId};
     use eel_vertebra::{Settings, Vertebra, lockstep, turn};
 
     #[cortex_m_rt::entry]
@@ -19,7 +20,20 @@ mod image {
             cortex_m::asm::udf();
         };
         let mut vertebra = Vertebra::new(black_box(Settings::prototype(node, 1)), now);
+        let (amplitude, wavelength) = black_box((800, 8_000));
+        let Ok(gait) = Gait::new(
+            black_box(1_000),
+            amplitude,
+            wavelength,
+            black_box(Plane::Lateral),
+        ) else {
+            cortex_m::asm::udf();
+        };
+        let mut head = Head::new(black_box(Config::new(gait)), now);
         loop {
+            if let Some(frame) = Frame::standard(black_box(0x701), black_box(&[5])) {
+                lead(&mut head, black_box(now), &frame);
+            }
             if let Ok(input) = lockstep::Input::decode(black_box(&[])) {
                 take_turn(&mut vertebra, input);
             }
@@ -34,7 +48,7 @@ mod image {
             sample,
             frames: heard,
         } = input;
-        let drives = turn(vertebra, now, heard, &sample, |frame| {
+        let drives = turn(vertebra, now, heard.iter().copied(), &sample, |frame| {
             black_box(frames.push(frame).is_ok());
         });
         black_box(
@@ -61,6 +75,27 @@ mod image {
         vertebra.note_overruns(black_box(0), black_box(0));
         while let Some(event) = vertebra.poll_event() {
             black_box(event);
+        }
+    }
+
+    /// Does everything that a platform can ask of a head.
+    fn lead(head: &mut Head, now: eel_units::Instant, frame: &Frame) {
+        head.handle_frame(now, frame);
+        head.tick(now);
+        while let Some(frame) = head.poll_transmit() {
+            black_box(frame);
+        }
+        while let Some(event) = head.poll_event() {
+            black_box(event);
+        }
+        if black_box(false) {
+            head.stop(now);
+        }
+        if black_box(false) {
+            head.reset();
+        }
+        for id in NodeId::all() {
+            black_box((head.node(id), head.running()));
         }
     }
 

@@ -3,8 +3,7 @@
 use core::num::{NonZeroU8, NonZeroU16};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use eel_canopen::Frame;
-use eel_protocol::{Cob, HEAD_NODE, NodeId};
+use eel_protocol::{Cob, Frame, HEAD_NODE, NodeId};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming};
 use embassy_stm32::can::filter::{Action, Filter, FilterType, StandardFilter};

@@ -1,0 +1,301 @@
+//! The project keeps its own rules: who imports whom, how long a file is, what logic may not do.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Which crate may import which of ours, as ARCHITECTURE.md says; nothing else may.
+const IMPORTS: &[(&str, &[&str])] = &[
+    ("eel-units", &[]),
+    ("eel-kinematics", &["eel-units"]),
+    ("eel-canopen", &[]),
+    ("eel-protocol", &["eel-units", "eel-canopen"]),
+    (
+        "eel-vertebra",
+        &["eel-kinematics", "eel-canopen", "eel-protocol", "eel-units"],
+    ),
+    (
+        "eel-head",
+        &["eel-kinematics", "eel-canopen", "eel-protocol", "eel-units"],
+    ),
+    ("eel-drivers", &["eel-units"]),
+    (
+        "board-stm32g474",
+        &["eel-vertebra", "eel-drivers", "eel-protocol", "eel-units"],
+    ),
+    // Its second binary links every logic crate, so the head too, to look for panics.
+    (
+        "board-qemu",
+        &["eel-vertebra", "eel-protocol", "eel-units", "eel-head"],
+    ),
+    ("eel-transport", &["eel-protocol"]),
+    (
+        "eel",
+        &[
+            "eel-transport",
+            "eel-head",
+            "eel-kinematics",
+            "eel-protocol",
+            "eel-units",
+        ],
+    ),
+    (
+        "hil-sim",
+        &[
+            "eel-vertebra",
+            "eel-head",
+            "eel-kinematics",
+            "eel-protocol",
+            "eel-units",
+            "eel-transport",
+        ],
+    ),
+    ("xtask", &[]),
+];
+/// The crate that may import everything.
+const TESTS: &str = "eel-tests";
+
+/// Crates without a clock, a bus, an allocator, a float or an unsafe block.
+const LOGIC: [&str; 7] = [
+    "units",
+    "kinematics",
+    "canopen",
+    "protocol",
+    "vertebra",
+    "head",
+    "drivers",
+];
+
+/// The most lines of a file, and the files that may have more, each with its reason.
+const LINES: usize = 500;
+const LONGER: &[(&str, &str)] = &[
+    (
+        "firmware/protocol/src/dictionary/table.rs",
+        "one table, one object after the other",
+    ),
+    (
+        "firmware/protocol/src/messages.rs",
+        "one table, one message after the other",
+    ),
+];
+
+/// The one file outside the boards that may hold unsafe: two instructions of the target, beside safe
+/// code that gives the same bits.
+const INSTRUCTIONS: &str = "firmware/units/src/multiply.rs";
+
+/// The most unsafe places in the boards together.
+const UNSAFE: usize = 20;
+
+/// Returns the folder of the workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
+        .canonicalize()
+        .expect("the workspace")
+}
+
+/// Returns the path of every source file with its text.
+fn sources() -> Vec<(String, String)> {
+    let mut files = Vec::new();
+    for folder in ["firmware", "host-tools", "hil-sim", "tests"] {
+        collect(&root().join(folder), &mut files);
+    }
+    assert!(files.len() > 50, "only {} files found", files.len());
+    files
+        .into_iter()
+        .map(|path| {
+            let text = fs::read_to_string(&path).expect("a text");
+            let name = path.strip_prefix(root()).expect("a path of ours");
+            (name.display().to_string(), text)
+        })
+        .collect()
+}
+
+/// Adds the source files of a folder.
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        if path.is_dir() && !name.starts_with(['.', '_']) && !name.starts_with("target") {
+            collect(&path, files);
+        } else if name.ends_with(".rs") {
+            files.push(path);
+        }
+    }
+}
+
+/// Fails with one line for each thing found.
+fn expect_none(found: &[String]) {
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+#[test]
+fn crates_import_only_what_they_may() {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "metadata",
+            "--format-version",
+            "1",
+            "--no-deps",
+            "--offline",
+        ])
+        .current_dir(root())
+        .output()
+        .expect("cargo runs");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let packages = metadata["packages"].as_array().expect("packages");
+    let mut found = Vec::new();
+    let mut seen = 0;
+    for package in packages {
+        let name = package["name"].as_str().expect("a name");
+        if name == TESTS {
+            continue;
+        }
+        let Some((_, allowed)) = IMPORTS.iter().find(|(importer, _)| *importer == name) else {
+            found.push(format!("{name} is not in the table of ARCHITECTURE.md"));
+            continue;
+        };
+        seen += 1;
+        for dependency in package["dependencies"].as_array().expect("dependencies") {
+            let imported = dependency["name"].as_str().expect("a name");
+            // The kind of a normal dependency is null; tests and build scripts may use others.
+            if dependency["path"].is_string()
+                && dependency["kind"].is_null()
+                && !allowed.contains(&imported)
+            {
+                found.push(format!("{name} may not import {imported}"));
+            }
+        }
+    }
+    expect_none(&found);
+    assert_eq!(seen, IMPORTS.len(), "the table names crates that are gone");
+}
+
+#[test]
+fn logic_has_no_std_no_unsafe_and_no_float() {
+    let mut found = Vec::new();
+    for name in LOGIC {
+        let path = format!("firmware/{name}/src/lib.rs");
+        let text = fs::read_to_string(root().join(&path)).expect("a library");
+        // Where one file may hold unsafe, it can only be denied.
+        let may_allow = INSTRUCTIONS.starts_with(&format!("firmware/{name}/"));
+        let no_unsafe = if may_allow {
+            "#![deny(unsafe_code)]"
+        } else {
+            "#![forbid(unsafe_code)]"
+        };
+        for attribute in [
+            "#![no_std]",
+            no_unsafe,
+            "#![deny(clippy::float_arithmetic)]",
+        ] {
+            if !text.lines().any(|line| line == attribute) {
+                found.push(format!("{path} lacks {attribute}"));
+            }
+        }
+    }
+    expect_none(&found);
+}
+
+#[test]
+fn files_fit_in_a_head() {
+    let mut found = Vec::new();
+    for (path, text) in sources() {
+        let lines = text.lines().count();
+        let may_be_longer = LONGER.iter().any(|(longer, _)| *longer == path);
+        if lines > LINES && !may_be_longer {
+            found.push(format!("{path} has {lines} lines, more than {LINES}"));
+        }
+    }
+    expect_none(&found);
+}
+
+#[test]
+fn nothing_is_left_for_later() {
+    // Written apart, or this file would find itself.
+    let marks = [
+        concat!("TO", "DO"),
+        concat!("FIX", "ME"),
+        concat!("to", "do!"),
+        concat!("unimple", "mented!"),
+        concat!("In the ", "making"),
+    ];
+    let mut found = Vec::new();
+    for (path, text) in sources() {
+        for (number, line) in text.lines().enumerate() {
+            for mark in marks {
+                if line.contains(mark) {
+                    found.push(format!("{path}:{}: {mark}", number + 1));
+                }
+            }
+        }
+    }
+    expect_none(&found);
+}
+
+#[test]
+fn unsafe_is_rare_explained_and_only_in_boards() {
+    let places = [
+        concat!("unsafe", " {"),
+        concat!("unsafe", " impl"),
+        concat!("unsafe", " fn"),
+    ];
+    let mut found = Vec::new();
+    let mut count = 0;
+    for (path, text) in sources() {
+        let lines: Vec<_> = text.lines().collect();
+        for (number, line) in lines.iter().enumerate() {
+            let code = line.split("//").next().unwrap_or_default();
+            if !places.iter().any(|place| code.contains(place)) {
+                continue;
+            }
+            if path == INSTRUCTIONS {
+                continue;
+            }
+            if !path.starts_with("firmware/board-") {
+                found.push(format!("{path}:{}: unsafe outside the boards", number + 1));
+                continue;
+            }
+            count += 1;
+            let near = &lines[number.saturating_sub(3)..(number + 2).min(lines.len())];
+            if !near.iter().any(|line| line.contains("// SAFETY: ")) {
+                found.push(format!("{path}:{}: no SAFETY line", number + 1));
+            }
+        }
+    }
+    expect_none(&found);
+    assert!(
+        (1..=UNSAFE).contains(&count),
+        "{count} unsafe places, at most {UNSAFE}"
+    );
+    println!("{count} unsafe places in the boards");
+}
+
+#[test]
+fn manifests_share_the_workspace_s_lints() {
+    let mut found = Vec::new();
+    for (importer, _) in IMPORTS {
+        let output = fs::read_to_string(root().join(manifest_of(importer))).expect("a manifest");
+        if !output.contains("[lints]\nworkspace = true") {
+            found.push(format!("{importer} does not take the workspace's lints"));
+        }
+    }
+    expect_none(&found);
+}
+
+/// Returns the path of a crate's manifest.
+fn manifest_of(name: &str) -> String {
+    let folder = match name {
+        "hil-sim" => "hil-sim".to_owned(),
+        "eel" | "xtask" => format!("host-tools/{name}"),
+        "eel-transport" => "host-tools/transport".to_owned(),
+        _ => format!("firmware/{}", name.trim_start_matches("eel-")),
+    };
+    format!("{folder}/Cargo.toml")
+}
