@@ -1,6 +1,8 @@
 //! From the motors' angles to the platform, with its Jacobian.
 
-use eel_units::{Angle, Reciprocal, SIN_COS_NEAR, root_q30, round_shift, sin_cos_near};
+use eel_units::{
+    Angle, SIN_COS_NEAR, invert_normal, root_q30, round_shift, shift_left_high, sin_cos_near,
+};
 
 use crate::jacobian::Jacobian;
 use crate::pose::{Joints, PoseError};
@@ -8,8 +10,9 @@ use crate::rotation::Rotation;
 use crate::vector::{ROOT_HALF_Q30, Vector, dot, times, times_minus, times_plus};
 use crate::wrist::{Leg, Wrist};
 
-/// The least assembly margin of a leg: W = ½ (√2 at home), in Q30, squared.
-const LEAST_ASSEMBLY_SQUARE: i64 = 1 << 28;
+/// The least assembly margin of a leg, W = ½ (√2 at home), squared, in Q30; a little more, so that
+/// one over it stays below 2.
+const LEAST_ASSEMBLY_SQUARE: i64 = (1 << 28) + (1 << 18);
 /// The least serial margin: ⅛ in Q29.
 const LEAST_SERIAL: i32 = 1 << 26;
 
@@ -154,16 +157,21 @@ impl Root {
                 PoseError::Singular
             });
         }
-        let divisor = (whole + (1 << 29)) >> 30; // Q28
-        if divisor > i64::from(i32::MAX) {
+        if whole >= 8 << 58 {
             return Err(PoseError::OutOfReach);
         }
         let margin = root_q30(square.min(i64::from(u32::MAX)) as u32);
         let w = i64::from(margin) * i64::from(side);
-        let reciprocal = Reciprocal::new(divisor as i32);
-        // In Q59, to Q28.
-        let cosine = reciprocal.times_q30(round_shift::<31>(2 * k * n + m * w));
-        let sine = reciprocal.times_q30(round_shift::<31>(2 * m * n - k * w));
+        // H in ¼..8, in Q58: its high half has 3 to 8 leading zeros.
+        let shift = ((whole >> 32) as u32).leading_zeros().wrapping_sub(1);
+        let inverse = i64::from(invert_normal(shift_left_high(whole, shift)));
+        // |numerator| ≤ H, brought to ±2³⁰ beside H in 2³⁰..2³¹.
+        let over = |numerator: i64| {
+            let normal = shift_left_high(numerator, shift.wrapping_sub(1));
+            round_shift::<30>(i64::from(normal) * inverse)
+        };
+        let cosine = over(k * n + ((m * w) >> 1));
+        let sine = over(m * n - ((k * w) >> 1));
         Ok(Self {
             sine,
             cosine,

@@ -47,8 +47,9 @@ impl Wrist {
         let (theta1, margin1) = self.legs[0].inverse(first)?;
         let (theta2, margin2) = self.legs[1].inverse(second)?;
         // θ3 = π/4 + atan((y − x)/(y + x)) of C1. Within the workspace both are 0.4 and more.
-        let (x, y) = (i64::from(first[0]), i64::from(first[1]));
-        let third = small_ratio(y - x, y + x).ok_or(PoseError::OutOfReach)?;
+        let (x, y) = (first[0], first[1]);
+        let third =
+            small_ratio(y.saturating_sub(x), y.saturating_add(x)).ok_or(PoseError::OutOfReach)?;
         let turn = arctangent(third);
         let theta3 = Angle::FRAC_PI_4.to_q29() + ((turn >> 1) + (turn & 1));
         let joints = Joints([theta1, theta2, Angle::from_q29(theta3)]);
@@ -80,8 +81,8 @@ impl Leg {
         }
         let margin = root_q30(square.min(i64::from(u32::MAX)) as u32);
         // tan(θ/2) = (G − E)/(F + √D): the home working mode by construction.
-        let below = f64 + i64::from((margin >> 1) + (margin & 1));
-        let half = small_ratio(g64 - e64, below).ok_or(PoseError::OutOfReach)?;
+        let below = f + ((margin >> 1) + (margin & 1));
+        let half = small_ratio(g.saturating_sub(e), below).ok_or(PoseError::OutOfReach)?;
         // The arctangent in Q30, read in Q29, is twice itself.
         Ok((Angle::from_q29(arctangent(half)) - self.zero, margin))
     }
@@ -89,9 +90,9 @@ impl Leg {
 
 /// Returns `number / divisor` in Q31 where it is within the arctangent's ±0.625.
 #[inline(always)]
-fn small_ratio(number: i64, divisor: i64) -> Option<i32> {
-    if divisor <= 0 || divisor > i64::from(i32::MAX) || number.abs() * 8 > divisor * 5 {
+fn small_ratio(number: i32, divisor: i32) -> Option<i32> {
+    if number.saturating_abs() >= (divisor >> 1) + (divisor >> 3) {
         return None;
     }
-    Some(divide_q31(number as i32, divisor as i32))
+    Some(divide_q31(number, divisor))
 }

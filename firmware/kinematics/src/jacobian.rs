@@ -42,16 +42,18 @@ impl Jacobian {
         cranks: i32,
     ) -> Option<Self> {
         let [x, y, z] = &basis;
-        // W ≥ ½: the quotient of two Q30 numbers is within ±2, Q29 of W within the divisor's range.
-        let inverse1 = Reciprocal::new(margins[0] >> 1);
-        let inverse2 = Reciprocal::new(margins[1]);
+        // W > ½: one over it is below 2, in Q30.
+        let [inverse1, inverse2] =
+            margins.map(|margin| i64::from(Reciprocal::new(margin).to_q30()));
         let mut torque = [[0; 3]; 3];
         let mut excess = 0;
         for axis in 0..3 {
             // Aᵀλ = M for a unit moment about this axis of the base.
-            let lambda2 = i64::from(inverse2.times_q30(x[axis])); // Q30
+            let lambda2 = i64::from(round_shift::<30>(i64::from(x[axis]) * inverse2)); // Q30
+            // Below 7 in Q28; over W below 14, and cut to 8 with the answer as a whole.
             let sum = (i64::from(y[axis]) << 29) + i64::from(along[0]) * lambda2; // Q59
-            let lambda1 = -i64::from(inverse1.times_over_q29(round_shift_saturating::<31>(sum)));
+            let sum = i64::from(round_shift::<31>(sum));
+            let lambda1 = -((sum * inverse1 + (1 << 29)) >> 30);
             let sum = (i64::from(z[axis]) << 27) // Q57
                 + i64::from(across) * lambda1
                 - ((i64::from(along[1]) * lambda2) >> 2);

@@ -31,9 +31,39 @@ pub const fn round_shift_saturating<const BITS: u32>(value: i64) -> i32 {
     saturate(value.saturating_add(1 << (BITS - 1)) >> BITS)
 }
 
-/// One over a positive number, ready to multiply by.
+/// Returns 2⁶¹ / `normal` for `normal` in 2³⁰..2³¹, wrong by at most 1.2 parts in 10⁹.
 ///
-/// Made with one 32-bit division and one Newton step; relative error at most 1.2 parts in 10⁹.
+/// The answer is in 2³⁰..2³¹ too. One 32-bit division and one Newton step. Outside that range the
+/// answer is meaningless, and no more than that.
+#[inline(always)]
+pub const fn invert_normal(normal: i32) -> i32 {
+    // 17 bits with the lowest set: the middle of the interval that was cut off, never zero.
+    let Some(seed) = u32::MAX.checked_div(normal as u32 >> 14 | 1) else {
+        return i32::MAX;
+    };
+    // 2⁶¹ / normal to 15 bits, the middle again of what the division cut off; below 2³¹ since the
+    // divisor above is at least 2¹⁶ + 1.
+    let rough = seed << 15 | 1 << 14;
+    // The residual 2⁶¹ − normal · rough is within ±2⁴⁶: what both products hold.
+    let residual = (1i64 << 61).wrapping_sub((normal as i64).wrapping_mul(rough as i64));
+    let step = (residual >> 16)
+        .wrapping_mul(rough as i64)
+        .wrapping_add(1 << 44)
+        >> 45;
+    // At a power of two the rounding reaches 2³¹, one more than the sign bit allows.
+    let inverse = rough.wrapping_add(step as u32);
+    (inverse - (inverse >> 31)) as i32
+}
+
+/// Returns bits 32..64 of `value · 2^shift`, for a shift in 1..=31.
+#[inline(always)]
+pub const fn shift_left_high(value: i64, shift: u32) -> i32 {
+    let (high, low) = ((value >> 32) as u32, value as u32);
+    // Masked, so that no shift can be out of range.
+    (high << (shift & 31) | low >> (32u32.wrapping_sub(shift) & 31)) as i32
+}
+
+/// One over a positive number, ready to multiply by; relative error at most 1.2 parts in 10⁹.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reciprocal {
     /// 2⁶¹ / (divisor · 2^shift), in 2³⁰..2³¹.
@@ -48,42 +78,10 @@ impl Reciprocal {
     pub const fn new(divisor: i32) -> Self {
         let divisor = if divisor < 1 { 1 } else { divisor };
         let shift = divisor.leading_zeros() - 1;
-        let normal = (divisor as u32) << shift;
-        // 17 bits with the lowest set: the middle of the interval that was cut off, never zero.
-        let Some(seed) = u32::MAX.checked_div(normal >> 14 | 1) else {
-            return Self {
-                mantissa: i32::MAX,
-                shift,
-            };
-        };
-        // 2⁶¹ / normal to 15 bits, the middle again of what the division cut off; below 2³¹ since
-        // the divisor above is at least 2¹⁶ + 1.
-        let rough = seed << 15 | 1 << 14;
-        // The residual 2⁶¹ − normal · rough is within ±2⁴⁶: what both products hold.
-        let residual = (1i64 << 61).wrapping_sub((normal as i64).wrapping_mul(rough as i64));
-        let step = ((residual >> 16).wrapping_mul(rough as i64) + (1 << 44)) >> 45;
-        // At a power of two the rounding reaches 2³¹, one more than the sign bit allows.
-        let mantissa = rough.wrapping_add(step as u32);
-        let mantissa = (mantissa - (mantissa >> 31)) as i32;
-        Self { mantissa, shift }
-    }
-
-    /// Returns `number / divisor` in Q31 for |number| < divisor; beyond that it saturates.
-    ///
-    /// Wrong by at most 1.2 parts in 10⁹ of the quotient and half a step of 2⁻³¹.
-    #[inline(always)]
-    pub const fn times_q31(self, number: i32) -> i32 {
-        // |number · 2^shift| < 2⁶¹; beyond the range it is cut to what i32 holds.
-        let normal = saturate((number as i64) << self.shift);
-        saturate((normal as i64 * self.mantissa as i64 + (1 << 29)) >> 30)
-    }
-
-    /// Returns `number / divisor` in Q30 for |number| < 2 · divisor; beyond that it saturates.
-    #[inline(always)]
-    pub const fn times_q30(self, number: i32) -> i32 {
-        // shift ≤ 30, so that the right shift is at least 1; |product| < 2⁶².
-        let down = 31 - self.shift;
-        saturate((number as i64 * self.mantissa as i64 + (1i64 << (down - 1))) >> down)
+        Self {
+            mantissa: invert_normal(divisor << shift),
+            shift,
+        }
     }
 
     /// Returns `number · 2^29 / divisor`, saturated: Qn over a divisor in Q29 stays in Qn.
@@ -93,14 +91,22 @@ impl Reciprocal {
         let down = 32 - self.shift;
         saturate((number as i64 * self.mantissa as i64 + (1i64 << (down - 1))) >> down)
     }
+
+    /// Returns 1 / divisor in Q30, the divisor in Q30 and at least ½; wrong by 2 parts in 10⁹.
+    #[inline(always)]
+    pub const fn to_q30(self) -> i32 {
+        // The shift is 0 or 1 there.
+        self.mantissa >> (1u32.wrapping_sub(self.shift) & 31)
+    }
 }
 
-/// Returns `number / divisor` in Q31 for |number| < divisor, wrong by at most 1.3e-9.
+/// Returns `number / divisor` in Q31 for |number| ≤ 0.99 divisor, wrong by at most 1.3e-9.
 ///
-/// Beyond that range it saturates; a divisor of zero or less counts as 1.
+/// Beyond that range the answer is meaningless; a divisor of zero or less counts as 1.
 #[inline(always)]
 pub const fn divide_q31(number: i32, divisor: i32) -> i32 {
-    Reciprocal::new(divisor).times_q31(number)
+    let Reciprocal { mantissa, shift } = Reciprocal::new(divisor);
+    round_shift::<30>((number << shift) as i64 * mantissa as i64)
 }
 
 /// Returns the square root of a Q30 number in 0..4, in Q30, wrong by at most one step of 2⁻³⁰.

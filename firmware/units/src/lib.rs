@@ -11,6 +11,7 @@
 #![deny(clippy::float_arithmetic)]
 
 mod arithmetic;
+#[rustfmt::skip]
 mod coefficients;
 mod multiply;
 mod quantity;
@@ -18,7 +19,8 @@ mod time;
 mod trigonometry;
 
 pub use arithmetic::{
-    Reciprocal, divide_q31, root_q30, round_shift, round_shift_saturating, saturate,
+    Reciprocal, divide_q31, invert_normal, root_q30, round_shift, round_shift_saturating, saturate,
+    shift_left_high,
 };
 pub use multiply::{multiply_high, multiply_high_add};
 pub use quantity::{Angle, AngularVelocity, Current, Duty, Temperature, Torque, Voltage};
