@@ -49,7 +49,7 @@ impl fmt::Display for Report {
         for row in &self.checks {
             let verdict = if row.passed { "pass" } else { "FAIL" };
             let Row { name, figure, bound, unit, .. } = row;
-            writeln!(out, "{verdict}  {name:width$}  {figure:10.3e} ≤ {bound:.0e} {unit}")?;
+            writeln!(out, "{verdict}  {name:width$}  {figure:10.3e} ≤ {bound:.1e} {unit}")?;
         }
         Ok(())
     }

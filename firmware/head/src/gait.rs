@@ -16,8 +16,18 @@ const STATIONS: usize = JOINTS + 2;
 const PLACES: [i64; STATIONS] = places();
 /// e^{2.2 (s/L − 1)} at each station in Q30.
 const ENVELOPE: [i64; STATIONS] = [
-    118_973_985, 184_731_766, 213_913_457, 247_704_918, 286_834_346, 332_144_968, 384_613_215,
-    445_369_760, 515_723_890, 597_191_715, 691_528_841, 1_073_741_824,
+    118_973_985,
+    184_731_766,
+    213_913_457,
+    247_704_918,
+    286_834_346,
+    332_144_968,
+    384_613_215,
+    445_369_760,
+    515_723_890,
+    597_191_715,
+    691_528_841,
+    1_073_741_824,
 ];
 /// One over the length of each body in body lengths: 0.2, nine times 1/15, 0.2.
 const PER_LENGTH: [i64; JOINTS + 1] = [5, 15, 15, 15, 15, 15, 15, 15, 15, 15, 5];
@@ -73,12 +83,8 @@ const fn places() -> [i64; STATIONS] {
 
 impl Gait {
     /// The default: 1 Hz, tail amplitude 0.08 body lengths, wavelength 0.8 body lengths, lateral.
-    pub const SWIM: Self = Self {
-        frequency_mhz: 1_000,
-        amplitude: 800,
-        wavelength: 8_000,
-        plane: Plane::Lateral,
-    };
+    pub const SWIM: Self =
+        Self { frequency_mhz: 1_000, amplitude: 800, wavelength: 8_000, plane: Plane::Lateral };
 
     /// Makes a gait from its frequency in mHz, and from the amplitude of the tail edge and the
     /// length of the wave in 10⁻⁴ body lengths.

@@ -3,8 +3,8 @@
 use eel_kinematics::Pose;
 use eel_protocol::emergency::EmergencyReport;
 use eel_protocol::{
-    Cob, Frame, FrameError, HEAD_HEARTBEAT_MS, HEAD_NODE, NodeId, PoseReport, SYNC_COUNTER_OVERFLOW,
-    SYNC_PERIOD_US, VERTEBRAE,
+    Cob, Frame, FrameError, HEAD_HEARTBEAT_MS, HEAD_NODE, NodeId, PoseReport,
+    SYNC_COUNTER_OVERFLOW, SYNC_PERIOD_US, VERTEBRAE,
 };
 use eel_units::{Duration, Instant};
 use heapless::Deque;
@@ -208,7 +208,9 @@ impl Head {
                 self.events.push(Event::GaitStarted);
                 self.enter(now, Phase::Swimming);
             }
-            Phase::Straightening if elapsed.to_micros() >= self.fade() + STRAIGHTENED.to_micros() => {
+            Phase::Straightening
+                if elapsed.to_micros() >= self.fade() + STRAIGHTENED.to_micros() =>
+            {
                 self.enter(now, Phase::SwitchingOff);
             }
             Phase::SwitchingOff if elapsed >= SWITCHED_OFF => {

@@ -193,7 +193,9 @@ impl Tracker {
                 self.offs = 0;
                 (Mode::FaultReset, self.status.pose)
             }
-            Stage::Enabling | Stage::Running if wish == Wish::Run => (Mode::Run, self.blend(now, gait)),
+            Stage::Enabling | Stage::Running if wish == Wish::Run => {
+                (Mode::Run, self.blend(now, gait))
+            }
             Stage::Started if wish == Wish::Run && self.may_run() => {
                 self.status.stage = Stage::Enabling;
                 self.run_since = now;

@@ -1,7 +1,7 @@
 //! The vertebra behind its node: estimation, states, control, protection.
 
-use eel_kinematics::{Joints, Pose};
-use eel_protocol::emergency::{Emergency, Source};
+use eel_kinematics::{Joints, Pose, PoseError};
+use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, Mode, State, Status};
 use eel_units::{Angle, Instant, Torque};
 
@@ -12,22 +12,21 @@ use crate::events::{Event, EventQueue};
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
 use crate::limits::{MotorBounds, Situation, bounds};
-use crate::machine::{Machine, Outcome, STOP_DAMPED};
+use crate::machine::{Machine, Outcome};
 use crate::objects::{Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
 use crate::settings::Settings;
 use crate::spline::{Reference, Spline};
-use crate::workspace::{Limited, admit, is_believable};
+use crate::workspace::{Limited, admit};
 
 /// Deviation from the reference that is worth a warning: 150 mrad.
 const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
 /// Conditions that a fault reset can't clear because the reset itself, or time, does.
-const CLEARED_BY_RESET: [Condition; 4] = [
-    Condition::Latched,
-    Condition::CommandLost,
-    Condition::Encoders,
-    Condition::NotOperational,
-];
+const CLEARED_BY_RESET: [Condition; 4] =
+    [Condition::Latched, Condition::CommandLost, Condition::Encoders, Condition::NotOperational];
+/// Conditions that are told as warnings while they hold.
+const WARNINGS: [Condition; 3] =
+    [Condition::TargetLimited, Condition::CommandLate, Condition::FollowingError];
 
 /// Everything of a vertebra but its node.
 #[derive(Clone, Debug)]
@@ -50,6 +49,8 @@ pub(crate) struct Core {
     pub received_feed: FeedForward,
     pub status: Status,
     limited: Limited,
+    warned: bool,
+    pub over_current_ticks: [u8; 3],
     pub effort: Effort,
     pub achieved: [Torque; 3],
     pub unallocated: [Torque; 3],
@@ -85,6 +86,8 @@ impl Core {
             received_feed: FeedForward::NEUTRAL,
             status: Status::NONE,
             limited: Limited::default(),
+            warned: false,
+            over_current_ticks: [0; 3],
             effort: Effort {
                 torque: [Torque::ZERO; 3],
                 limit: [LimitCode::Off; 3],
@@ -117,6 +120,7 @@ impl Core {
         self.note_state(before);
         let drives = self.drive(sample);
         self.report();
+        self.end_warnings();
         drives
     }
 
@@ -138,85 +142,33 @@ impl Core {
             self.pending.fault(emergency, Some(motor), 0);
         }
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
-        self.motion = if aligned { self.moving() } else { None };
-        if let Some(motion) = &self.motion {
-            self.pose = motion.direct.rotation.to_pose();
-        } else if aligned && self.machine.is_enabled() {
-            self.pending.fault(Emergency::OUT_OF_REACH, None, 0);
+        self.motion = None;
+        if aligned {
+            match self.moving() {
+                Ok(motion) => {
+                    self.motion = Some(motion);
+                    self.pose = motion.direct.rotation.to_pose();
+                    self.find_residual();
+                }
+                Err(error) if self.machine.is_enabled() => {
+                    let emergency = match error {
+                        PoseError::OutOfReach => Emergency::OUT_OF_REACH,
+                        PoseError::Singular => Emergency::SINGULAR,
+                    };
+                    self.pending.fault(emergency, None, 0);
+                }
+                Err(_) => {}
+            }
         }
         self.take_faults();
     }
 
-    /// Returns where the wrist is and how it moves; `None` where it can't be.
-    fn moving(&self) -> Option<Motion> {
+    /// Returns where the wrist is and how it moves.
+    fn moving(&self) -> Result<Motion, PoseError> {
         let [a, b, c] = &self.encoders;
-        let direct = self.settings.wrist.direct(&Joints([a.angle(), b.angle(), c.angle()])).ok()?;
+        let direct = self.settings.wrist.direct(&Joints([a.angle(), b.angle(), c.angle()]))?;
         let omega = direct.jacobian.angular_velocity([a.speed(), b.speed(), c.speed()]);
-        Some(Motion { direct, omega })
-    }
-
-    /// Holds every reading against its limit and decides what may be enabled.
-    fn watch(&mut self, sample: &Sample) {
-        let limits = &self.settings.limits;
-        let low = sample.supply <= limits.supply_low.end;
-        let high = sample.supply >= limits.supply_high.end;
-        let board_hot = sample.board_temperature >= limits.board_hot.end;
-        let hot_motor =
-            sample.motor_temperature.iter().position(|value| *value >= limits.motor_hot.end);
-        let bridge = sample.bridge_fault.iter().position(|fault| *fault);
-        let aligned = self.encoders.iter().all(Encoder::is_aligned);
-        let believable = self.motion.is_some() && is_believable(&self.pose, limits);
-        self.status = self
-            .status
-            .with(Condition::Settings, !self.settings.are_sound())
-            .with(Condition::Encoders, !aligned)
-            .with(Condition::Pose, aligned && !believable)
-            .with(Condition::Voltage, low || high)
-            .with(Condition::Temperature, board_hot || hot_motor.is_some())
-            .with(Condition::Bridge, bridge.is_some())
-            .with(Condition::EmergencyStop, sample.emergency_stop)
-            .with(Condition::NotOperational, !self.operational);
-        if let Some(motor) = bridge {
-            self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
-        }
-        if self.machine.is_enabled() {
-            let centivolts = (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
-            if low {
-                self.pending.fault(Emergency::UNDER_VOLTAGE, None, centivolts);
-            } else if high {
-                self.pending.fault(Emergency::OVER_VOLTAGE, None, centivolts);
-            }
-            let decidegrees = |value: eel_units::Temperature| value.to_decidegrees() as u16;
-            if board_hot {
-                let detail = decidegrees(sample.board_temperature);
-                self.pending.fault(Emergency::BOARD_OVER_TEMPERATURE, None, detail);
-            }
-            if let Some(motor) = hot_motor {
-                let hot = sample.motor_temperature.get(motor).copied().unwrap_or_default();
-                let detail = decidegrees(hot);
-                self.pending.fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
-            }
-        }
-        self.take_faults();
-        if sample.emergency_stop {
-            self.emergency_stop(Emergency::EMERGENCY_STOP);
-        }
-        if self.machine.is_enabled() && self.stream.is_lost(self.now) {
-            self.stop(Emergency::COMMAND_LOST, crate::command::TARGET_TIMEOUT.to_micros() / 1_000);
-            self.status = self.status.with(Condition::CommandLost, true);
-        }
-        self.status = self.status.with(Condition::Latched, self.machine.state().is_latched());
-    }
-
-    /// Enters the fault state for the first fault that waits.
-    fn take_faults(&mut self) {
-        let Some((emergency, source)) = self.pending.first_fault() else { return };
-        let before = self.machine.state();
-        let motor = usize::from(source.motor).checked_sub(1);
-        if self.machine.fault(self.now, motor) {
-            self.emit(emergency, source);
-        }
-        self.note_state(before);
+        Ok(Motion { direct, omega })
     }
 
     /// Lets the path go on, or come to rest, while SYNCs or targets are missing.
@@ -224,6 +176,14 @@ impl Core {
         if self.stream.sync_overdue(self.now) {
             let missed = self.stream.begin_segment(self.now);
             self.continue_path(missed);
+        }
+    }
+
+    /// Tells the bus once that no warning holds any more.
+    fn end_warnings(&mut self) {
+        let holds = WARNINGS.iter().any(|condition| self.status.contains(*condition));
+        if self.warned && !holds && !self.machine.state().is_latched() {
+            self.emit(Emergency::CLEARED, Source::WHOLE);
         }
     }
 
@@ -317,65 +277,13 @@ impl Core {
         self.note_state(before);
     }
 
-    /// Forgets what a fault reset clears; encoders that failed align again.
-    fn reset_faults(&mut self) {
-        for (encoder, failed) in self.encoders.iter_mut().zip(self.pending.failed_encoders()) {
-            if failed {
-                *encoder = Encoder::new(&self.settings.motor);
-            }
-        }
-        self.pending.clear();
-        self.status = self.status.with(Condition::CommandLost, false);
-        self.emit(Emergency::CLEARED, Source::WHOLE);
-    }
-
-    /// Stops in order, with the reason, when enabled.
-    pub fn stop(&mut self, emergency: Emergency, detail: u32) {
-        let before = self.machine.state();
-        if self.machine.stop(self.now) {
-            let detail = detail.min(0xFFFF) as u16;
-            self.emit(emergency, Source { motor: 0, limit: 0, detail });
-        }
-        self.note_state(before);
-    }
-
-    /// Switches off at once, with the reason.
-    pub fn emergency_stop(&mut self, emergency: Emergency) {
-        let before = self.machine.state();
-        if self.machine.emergency_stop(self.now) {
-            self.emit(emergency, Source::WHOLE);
-        }
-        self.note_state(before);
-    }
-
-    /// Stops by NMT: in order when enabled, and latched in any case.
-    pub fn latch_stop(&mut self) {
-        if self.machine.is_enabled() {
-            self.stop(Emergency::STOPPED_BY_NMT, 0);
-        } else {
-            self.emergency_stop(Emergency::STOPPED_BY_NMT);
-        }
-    }
-
-    /// Lets go because the head's heartbeat is missing; the node sends the emergency itself.
-    pub fn lose_head(&mut self) {
-        let before = self.machine.state();
-        self.status = self.status.with(Condition::HeadLost, true);
-        self.machine.stop(self.now);
-        self.note_state(before);
-    }
-
-    /// Hears the head again, which by itself moves nothing.
-    pub fn hear_head(&mut self) {
-        self.status = self.status.with(Condition::HeadLost, false);
-    }
-
-    fn emit(&mut self, emergency: Emergency, source: Source) {
+    pub fn emit(&mut self, emergency: Emergency, source: Source) {
+        self.warned = emergency.severity == Severity::Warning;
         self.pending.push(emergency, source);
         self.events.push(Event::Emergency { emergency, source });
     }
 
-    fn note_state(&mut self, from: State) {
+    pub fn note_state(&mut self, from: State) {
         let to = self.machine.state();
         if from != to {
             self.events.push(Event::State { from, to });
@@ -435,8 +343,7 @@ impl Core {
         let angles = self.angles();
         let speeds = self.encoders.each_ref().map(Encoder::speed);
         let situation = Situation { sample, angles, speeds, command_cap };
-        let bounds: [MotorBounds; 3] =
-            bounds(&self.settings.limits, &self.electrical, &situation);
+        let bounds: [MotorBounds; 3] = bounds(&self.settings.limits, &self.electrical, &situation);
         let shared =
             motion.direct.jacobian.share(moment, &bounds.each_ref().map(|motor| motor.torque));
         self.achieved = shared.achieved;
@@ -454,26 +361,6 @@ impl Core {
             *drive = Drive::Duty(self.electrical.duty(state, torque, speed, measured, supply));
         }
         self.effort.limit = limit;
-        drives
-    }
-
-    /// Returns the torque that a stop still allows: it falls to nothing with time.
-    fn stop_cap(&self) -> Torque {
-        let elapsed = self.machine.elapsed(self.now).to_micros();
-        let left = STOP_DAMPED.to_micros().saturating_sub(elapsed);
-        let peak = i64::from(self.settings.limits.peak_torque.to_q24());
-        Torque::from_q24((peak * i64::from(left) / i64::from(STOP_DAMPED.to_micros())) as i32)
-    }
-
-    /// Returns the drives of a fault: the motor at fault is off, the others brake, then all off.
-    fn fault_drives(&self, sample: &Sample) -> [Drive; 3] {
-        if sample.emergency_stop || self.machine.elapsed(self.now) >= crate::machine::STOP_BRAKE {
-            return [Drive::Off; 3];
-        }
-        let mut drives = [Drive::Brake; 3];
-        if let Some(drive) = self.machine.faulty_motor().and_then(|motor| drives.get_mut(motor)) {
-            *drive = Drive::Off;
-        }
         drives
     }
 

@@ -27,6 +27,7 @@ pub mod lockstep;
 mod machine;
 mod objects;
 mod pending;
+mod protection;
 mod settings;
 mod spline;
 mod vertebra;

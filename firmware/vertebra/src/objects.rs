@@ -1,8 +1,8 @@
 //! The vertebra's part of the object dictionary: reading and writing each field.
 
 use eel_canopen::{Abort, Application, Entry};
-use eel_protocol::dictionary::{self, Field};
 use eel_protocol::PoseReport;
+use eel_protocol::dictionary::{self, Field};
 use eel_units::{Angle, Duration, Instant, Torque};
 
 use crate::core::Core;
@@ -195,7 +195,8 @@ impl Core {
             Field::RangePitch => limits.workspace.pitch = angle,
             Field::RangeRoll => limits.workspace.roll = angle,
             Field::RateLimit => {
-                limits.rate = eel_units::AngularVelocity::from_milliradians_per_second(value as i32);
+                limits.rate =
+                    eel_units::AngularVelocity::from_milliradians_per_second(value as i32);
             }
             _ => return Err(Abort::ReadOnly),
         }

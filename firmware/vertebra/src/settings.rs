@@ -123,9 +123,9 @@ impl Settings {
 }
 
 impl Gains {
-    /// The prototype's: stiff enough for a tenth of a degree of error per 0.2 N·m.
+    /// The prototype's: stiff enough for half a degree of error at 3.5 N·m.
     pub const PROTOTYPE: Self =
-        Self { stiffness: [120_000, 120_000, 80_000], damping: [4_000, 4_000, 2_000] };
+        Self { stiffness: [400_000, 400_000, 250_000], damping: [6_000, 6_000, 3_000] };
 }
 
 impl Limits {

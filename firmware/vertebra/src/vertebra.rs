@@ -155,6 +155,11 @@ impl Vertebra {
     fn hand_over_emergencies(&mut self, now: Instant) {
         while let Some((emergency, source)) = self.core.pending.pop() {
             let Emergency { code, register, .. } = emergency;
+            if emergency == Emergency::CLEARED {
+                // All bits that came from here; the node keeps those of its own errors.
+                self.node.emergency_cleared(now.to_micros(), 0xFF);
+                continue;
+            }
             self.node.emergency(now.to_micros(), code, register, Source::to_bytes(source));
         }
     }

@@ -237,8 +237,7 @@ impl Robot {
         for frame in &sent {
             seat.link.send(&mut self.bus, self.now_ns, *frame);
         }
-        let turn =
-            Turn { now, frames: &frames, sample: &sample, sent: &sent, drives: seat.drives };
+        let turn = Turn { now, frames: &frames, sample: &sample, sent: &sent, drives: seat.drives };
         observer.turn(seat.id, seat.node.as_ref(), &turn, &self.plant);
     }
 

@@ -172,8 +172,7 @@ impl Watcher {
     /// Takes the pictures of the last stride before the stop.
     fn photograph(&mut self, robot: &Robot) {
         let first_ns = self.swim_end_ns.saturating_sub(self.stride_ns);
-        let due_ns =
-            first_ns + self.stride_ns * self.snapshots.len() as u64 / SNAPSHOTS as u64;
+        let due_ns = first_ns + self.stride_ns * self.snapshots.len() as u64 / SNAPSHOTS as u64;
         if self.snapshots.len() <= SNAPSHOTS && robot.now_ns() >= due_ns {
             self.snapshots.push(picture::Snapshot {
                 time_s: robot.now_ns() as f64 / 1e9,
@@ -187,9 +186,11 @@ impl Watcher {
         NodeId::all()
             .filter(|id| {
                 let state = robot.node(*id).state();
-                state.is_some_and(|state| !state.is_latched()) && robot.head().node(*id).is_some_and(
-                    |status| status.stage == eel_head::Stage::Running,
-                )
+                state.is_some_and(|state| !state.is_latched())
+                    && robot
+                        .head()
+                        .node(*id)
+                        .is_some_and(|status| status.stage == eel_head::Stage::Running)
             })
             .count()
     }

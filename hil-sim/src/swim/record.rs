@@ -154,13 +154,22 @@ impl Records {
 
 /// Returns the first line of the state record: names with units.
 fn header() -> String {
-    let mut line = String::from("time_s,centre_x_m,centre_y_m,centre_z_m,tail_x_m,tail_y_m,tail_z_m");
+    let mut line =
+        String::from("time_s,centre_x_m,centre_y_m,centre_z_m,tail_x_m,tail_y_m,tail_z_m");
     line.push_str(",joint_power_w,supply_v");
     for id in NodeId::all() {
         let n = id.get();
         for name in [
-            "yaw_rad", "pitch_rad", "roll_rad", "reference_yaw_rad", "reference_pitch_rad",
-            "reference_roll_rad", "torque1_nm", "torque2_nm", "torque3_nm", "state",
+            "yaw_rad",
+            "pitch_rad",
+            "roll_rad",
+            "reference_yaw_rad",
+            "reference_pitch_rad",
+            "reference_roll_rad",
+            "torque1_nm",
+            "torque2_nm",
+            "torque3_nm",
+            "state",
         ] {
             let _ = write!(line, ",v{n}_{name}");
         }

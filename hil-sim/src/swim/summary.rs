@@ -123,7 +123,8 @@ impl fmt::Display for Summary {
         row(out, "frames", format_args!("{} ({} lost)", self.frames, self.frames_lost))?;
         row(out, "vertebrae", format_args!("{} operational", self.nodes_operational))?;
         row(out, "emergencies", format_args!("{}", self.emergencies))?;
-        let stop = if self.stopped_in_order { "straightened, switched off" } else { "not in order" };
+        let stop =
+            if self.stopped_in_order { "straightened, switched off" } else { "not in order" };
         row(out, "stop", format_args!("{stop}"))?;
         row(out, "real-time factor", format_args!("{:.1}", self.real_time_factor))?;
         writeln!(out, "\n  vertebra   peak yaw   peak torque   worst tracking error")?;

@@ -267,12 +267,12 @@ records! {
     }
     GAINS = 0x2020 "gains",
         "Gains and limits of the controller; may be changed while the wrist is off." {
-        1 StiffnessX "stiffness_x" stiffness(120_000), "Stiffness about x, swimming.";
-        2 StiffnessY "stiffness_y" stiffness(120_000), "Stiffness about y, diving.";
-        3 StiffnessZ "stiffness_z" stiffness(80_000), "Stiffness about z, torsion.";
-        4 DampingX "damping_x" damping(4_000), "Damping about x, swimming.";
-        5 DampingY "damping_y" damping(4_000), "Damping about y, diving.";
-        6 DampingZ "damping_z" damping(2_000), "Damping about z, torsion.";
+        1 StiffnessX "stiffness_x" stiffness(400_000), "Stiffness about x, swimming.";
+        2 StiffnessY "stiffness_y" stiffness(400_000), "Stiffness about y, diving.";
+        3 StiffnessZ "stiffness_z" stiffness(250_000), "Stiffness about z, torsion.";
+        4 DampingX "damping_x" damping(6_000), "Damping about x, swimming.";
+        5 DampingY "damping_y" damping(6_000), "Damping about y, diving.";
+        6 DampingZ "damping_z" damping(3_000), "Damping about z, torsion.";
         7 PeakTorque "peak_torque" PEAK_TORQUE, "Largest torque of each motor.";
         8 RangeYaw "range_yaw" half_range(5_236),
             "Workspace: largest yaw to either side, 30 degrees.";

@@ -1,0 +1,207 @@
+//! What makes a vertebra let go: limits of what it measures, loss of command, stops and faults.
+
+use eel_protocol::Condition;
+use eel_protocol::emergency::{Emergency, Source};
+use eel_kinematics::Joints;
+use eel_units::{Angle, Temperature, Torque};
+
+use crate::command::TARGET_TIMEOUT;
+use crate::core::Core;
+use crate::encoder::Encoder;
+use crate::io::{Drive, Sample};
+use crate::machine::{STOP_BRAKE, STOP_DAMPED};
+use crate::workspace::is_believable;
+
+/// Ticks for which a current may be above its hard limit.
+const OVER_CURRENT_TICKS: u8 = 3;
+/// Largest difference between the measured angles and those of the measured pose: 1 mrad.
+const RESIDUAL_LIMIT: Angle = Angle::from_milliradians(1);
+
+impl Core {
+    /// Holds every reading against its limit and decides what may be enabled.
+    pub fn watch(&mut self, sample: &Sample) {
+        self.note_refusals(sample);
+        self.find_faults(sample);
+        self.take_faults();
+        if sample.emergency_stop {
+            self.emergency_stop(Emergency::EMERGENCY_STOP);
+        }
+        if self.machine.is_enabled() && self.stream.is_lost(self.now) {
+            self.stop(Emergency::COMMAND_LOST, TARGET_TIMEOUT.to_micros() / 1_000);
+            self.status = self.status.with(Condition::CommandLost, true);
+        }
+        self.status = self.status.with(Condition::Latched, self.machine.state().is_latched());
+    }
+
+    /// Notes what stands against enabling.
+    fn note_refusals(&mut self, sample: &Sample) {
+        let limits = &self.settings.limits;
+        let aligned = self.encoders.iter().all(Encoder::is_aligned);
+        let believable = self.motion.is_some() && is_believable(&self.pose, limits);
+        let hot = sample.board_temperature >= limits.board_hot.end
+            || sample.motor_temperature.iter().any(|value| *value >= limits.motor_hot.end);
+        let voltage = sample.supply <= limits.supply_low.end
+            || sample.supply >= limits.supply_high.end;
+        self.status = self
+            .status
+            .with(Condition::Settings, !self.settings.are_sound())
+            .with(Condition::Encoders, !aligned)
+            .with(Condition::Pose, aligned && !believable)
+            .with(Condition::Voltage, voltage)
+            .with(Condition::Temperature, hot)
+            .with(Condition::Bridge, sample.bridge_fault.contains(&true))
+            .with(Condition::EmergencyStop, sample.emergency_stop)
+            .with(Condition::NotOperational, !self.operational);
+    }
+
+    /// Finds what is wrong with this vertebra: some of it always, some while its drives are on.
+    fn find_faults(&mut self, sample: &Sample) {
+        if self.status.contains(Condition::Settings) {
+            self.pending.fault(Emergency::SETTINGS_INVALID, None, 0);
+        }
+        if let Some(motor) = sample.bridge_fault.iter().position(|fault| *fault) {
+            self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
+        }
+        if !self.machine.is_enabled() {
+            self.over_current_ticks = [0; 3];
+            return;
+        }
+        let limits = &self.settings.limits;
+        let centivolts = (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
+        if sample.supply <= limits.supply_low.end {
+            self.pending.fault(Emergency::UNDER_VOLTAGE, None, centivolts);
+        } else if sample.supply >= limits.supply_high.end {
+            self.pending.fault(Emergency::OVER_VOLTAGE, None, centivolts);
+        }
+        let decidegrees = |value: Temperature| value.to_decidegrees() as u16;
+        if sample.board_temperature >= limits.board_hot.end {
+            let detail = decidegrees(sample.board_temperature);
+            self.pending.fault(Emergency::BOARD_OVER_TEMPERATURE, None, detail);
+        }
+        for (motor, value) in sample.motor_temperature.into_iter().enumerate() {
+            if value >= limits.motor_hot.end {
+                let detail = decidegrees(value);
+                self.pending.fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
+            }
+        }
+        self.find_over_current(sample);
+    }
+
+    /// Finds a current that stays far above what the bridge is told never to exceed.
+    fn find_over_current(&mut self, sample: &Sample) {
+        let limit = self.settings.motor.current_limit.to_microamps();
+        let hard = limit.saturating_add(limit / 2);
+        let readings = sample.current.into_iter().zip(&mut self.over_current_ticks);
+        for (motor, (current, ticks)) in readings.enumerate() {
+            let magnitude = current.abs().to_microamps();
+            *ticks = if magnitude > hard { ticks.saturating_add(1) } else { 0 };
+            if *ticks >= OVER_CURRENT_TICKS {
+                let milliamps = (magnitude / 1_000).min(0xFFFF) as u16;
+                self.pending.fault(Emergency::OVER_CURRENT, Some(motor), milliamps);
+            }
+        }
+    }
+
+    /// Compares the motors' angles with those that the measured pose should have: outside the
+    /// home branch, or with damaged constants, they part.
+    pub fn find_residual(&mut self) {
+        let residual = match self.settings.wrist.inverse(&self.pose) {
+            Ok(inverse) => {
+                let Joints(expected) = inverse.joints;
+                let parts = expected.into_iter().zip(self.angles());
+                parts.map(|(one, other)| (one - other).abs()).max().unwrap_or_default()
+            }
+            Err(_) => Angle::MAX,
+        };
+        let wrong = residual > RESIDUAL_LIMIT;
+        self.status = self.status.with(Condition::Residual, wrong);
+        if wrong && self.machine.is_enabled() {
+            let detail = residual.to_tenth_milliradians().unsigned_abs();
+            self.pending.fault(Emergency::RESIDUAL, None, detail);
+        }
+    }
+
+    /// Enters the fault state for the first fault that waits.
+    pub fn take_faults(&mut self) {
+        let Some((emergency, source)) = self.pending.first_fault() else { return };
+        let before = self.machine.state();
+        let motor = usize::from(source.motor).checked_sub(1);
+        if self.machine.fault(self.now, motor) {
+            self.emit(emergency, source);
+        }
+        self.note_state(before);
+    }
+
+    /// Forgets what a fault reset clears; encoders that failed align again.
+    pub fn reset_faults(&mut self) {
+        for (encoder, failed) in self.encoders.iter_mut().zip(self.pending.failed_encoders()) {
+            if failed {
+                *encoder = Encoder::new(&self.settings.motor);
+            }
+        }
+        self.pending.clear();
+        self.status = self.status.with(Condition::CommandLost, false);
+        self.emit(Emergency::CLEARED, Source::WHOLE);
+    }
+
+    /// Stops in order, with the reason, when enabled.
+    pub fn stop(&mut self, emergency: Emergency, detail: u32) {
+        let before = self.machine.state();
+        if self.machine.stop(self.now) {
+            let detail = detail.min(0xFFFF) as u16;
+            self.emit(emergency, Source { motor: 0, limit: 0, detail });
+        }
+        self.note_state(before);
+    }
+
+    /// Switches off at once, with the reason.
+    pub fn emergency_stop(&mut self, emergency: Emergency) {
+        let before = self.machine.state();
+        if self.machine.emergency_stop(self.now) {
+            self.emit(emergency, Source::WHOLE);
+        }
+        self.note_state(before);
+    }
+
+    /// Stops by NMT: in order when enabled, and latched in any case.
+    pub fn latch_stop(&mut self) {
+        if self.machine.is_enabled() {
+            self.stop(Emergency::STOPPED_BY_NMT, 0);
+        } else {
+            self.emergency_stop(Emergency::STOPPED_BY_NMT);
+        }
+    }
+
+    /// Lets go because the head's heartbeat is missing; the node sends the emergency itself.
+    pub fn lose_head(&mut self) {
+        let before = self.machine.state();
+        self.status = self.status.with(Condition::HeadLost, true);
+        self.machine.stop(self.now);
+        self.note_state(before);
+    }
+
+    /// Hears the head again, which by itself moves nothing.
+    pub fn hear_head(&mut self) {
+        self.status = self.status.with(Condition::HeadLost, false);
+    }
+
+    /// Returns the torque that a stop still allows: it falls to nothing with time.
+    pub fn stop_cap(&self) -> Torque {
+        let elapsed = self.machine.elapsed(self.now).to_micros();
+        let left = STOP_DAMPED.to_micros().saturating_sub(elapsed);
+        let peak = i64::from(self.settings.limits.peak_torque.to_q24());
+        Torque::from_q24((peak * i64::from(left) / i64::from(STOP_DAMPED.to_micros())) as i32)
+    }
+
+    /// Returns the drives of a fault: the motor at fault is off, the others brake, then all off.
+    pub fn fault_drives(&self, sample: &Sample) -> [Drive; 3] {
+        if sample.emergency_stop || self.machine.elapsed(self.now) >= STOP_BRAKE {
+            return [Drive::Off; 3];
+        }
+        let mut drives = [Drive::Brake; 3];
+        if let Some(drive) = self.machine.faulty_motor().and_then(|motor| drives.get_mut(motor)) {
+            *drive = Drive::Off;
+        }
+        drives
+    }
+}

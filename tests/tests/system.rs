@@ -1,0 +1,8 @@
+//! The whole robot in simulated time: it swims, and it lets go when it must.
+
+#[path = "system/faults.rs"]
+mod faults;
+#[path = "system/swim.rs"]
+mod swim;
+#[path = "system/watch.rs"]
+mod watch;
