@@ -22,10 +22,10 @@ pub(crate) struct Leg {
 ///
 /// The architecture is the prototype's, with parallel actuators; the parts may differ from the
 /// paper's ideal by ±2 % ([`crate::design::Geometry::kernel`] makes the constants and keeps that
-/// limit). The range of the kernel is every pose whose angles are within ±1.125 rad and whose crank
-/// angles are within ±1.117 rad, the third motor's within as much of its home; that is 1.8 times
-/// the paper's workspace and more than the mechanism's own limits (about 1.26 times) except in pure
-/// yaw.
+/// limit). The range of the kernel is every pose whose angles are within ±1.125 rad, whose crank
+/// angles are within ±1.117 rad, the third motor's within as much of its home, and whose margins are
+/// not too small: twice the paper's yaw, and more than the mechanism allows in pitch and roll with it
+/// (a leg lines up where the corners of the paper's workspace are scaled by 1.26).
 ///
 /// Margins are 1 at home on the ideal geometry and 0 at the singularity. The serial one is the
 /// lesser √D of the two legs; an answer is refused below ¼ (inverse) or ⅛ (direct), where the
