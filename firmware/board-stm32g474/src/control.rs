@@ -34,8 +34,14 @@ pub async fn run(hardware: Hardware, settings: Settings) {
     };
     let mut currents = Currents::new(hardware.currents);
     let mut counters = Counters::new(hardware.counters);
-    let mut vertebra = Vertebra::new(settings, now());
     let mut ticker = Ticker::every(Duration::from_millis(1));
+    // The bridges are off: what is measured now is the zero of the currents.
+    while !currents.has_offsets() {
+        ticker.next().await;
+        currents.take();
+        liveness::CONTROL.advance();
+    }
+    let mut vertebra = Vertebra::new(settings, now());
     loop {
         ticker.next().await;
         let start = Instant::now();

@@ -95,8 +95,13 @@ impl Currents {
         }
     }
 
-    /// Returns the means since the last call. While the offsets are averaged, for the first 256
-    /// ticks, the bridges must be off; every channel counts as faulty until then.
+    /// Tells whether the offsets are known.
+    pub const fn has_offsets(&self) -> bool {
+        self.ticks >= OFFSET_TICKS
+    }
+
+    /// Returns the means since the last call. The first 256 calls average the offsets instead: the
+    /// bridges must be off, and every channel counts as faulty.
     pub fn take(&mut self) -> Measurement {
         let sums = critical_section::with(|section| SUMS.borrow(section).replace(Sums::NONE));
         let supply = SUPPLY_RANGE * (sums.readings[3] / sums.count.max(1)) / STEPS;
@@ -105,7 +110,7 @@ impl Currents {
             supply: Voltage::from_millivolts(supply as i32),
             is_faulty: [true; 3],
         };
-        if self.ticks < OFFSET_TICKS {
+        if !self.has_offsets() {
             for (offset, reading) in self.offsets.readings.iter_mut().zip(sums.readings) {
                 *offset += reading;
             }

@@ -16,7 +16,8 @@ pub struct Note {
     magic: u32,
     /// Line of the panic; 0 for a fault of the CPU.
     pub line: u32,
-    /// Address of the instruction that faulted; 0 for a panic.
+    /// Address of the instruction that faulted, or the number of an interrupt that nobody expects;
+    /// 0 for a panic.
     pub address: u32,
 }
 
@@ -71,4 +72,10 @@ fn panic(info: &PanicInfo) -> ! {
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     stop(0, frame.pc())
+}
+
+// SAFETY: as above.
+#[exception]
+unsafe fn DefaultHandler(interrupt: i16) -> ! {
+    stop(0, interrupt.unsigned_abs().into())
 }

@@ -41,7 +41,11 @@ fn input() -> impl Strategy<Value = Input> {
                 bridge_fault: faults,
                 emergency_stop: stop,
             };
-            Input { now: Instant::from_micros(now), sample, frames }
+            Input {
+                now: Instant::from_micros(now),
+                sample,
+                frames,
+            }
         },
     )
 }
@@ -57,7 +61,13 @@ fn drive() -> impl Strategy<Value = Drive> {
 /// Splits a packet whose header must be right.
 fn open(packet: &Packet, kind: Kind) -> &[u8] {
     let (header, body) = packet.as_bytes().split_first_chunk().unwrap();
-    assert_eq!(Header::decode(*header), Ok(Header { kind, length: body.len() }));
+    assert_eq!(
+        Header::decode(*header),
+        Ok(Header {
+            kind,
+            length: body.len()
+        })
+    );
     body
 }
 
@@ -107,24 +117,42 @@ fn a_start_has_these_bytes() {
         serial: 0x1234_5678,
         now: Instant::from_micros(1_000),
     };
-    let bytes = [b'S', 1, 13, 0, 7, 0x78, 0x56, 0x34, 0x12, 0xE8, 0x03, 0, 0, 0, 0, 0, 0];
+    let bytes = [
+        b'S', 1, 13, 0, 7, 0x78, 0x56, 0x34, 0x12, 0xE8, 0x03, 0, 0, 0, 0, 0, 0,
+    ];
     assert_eq!(start.encode().as_bytes(), bytes);
     assert_eq!(Start::decode(&bytes[HEADER..]), Ok(start));
-    assert_eq!(Start::decode(&[11, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]), Err(PacketError::Value));
+    assert_eq!(
+        Start::decode(&[11, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+        Err(PacketError::Value)
+    );
 }
 
 #[test]
 fn headers_of_others_are_refused() {
-    assert_eq!(Header::decode([b'X', VERSION, 0, 0]), Err(PacketError::Kind));
-    assert_eq!(Header::decode([b'I', VERSION + 1, 0, 0]), Err(PacketError::Version));
-    assert_eq!(Header::decode([b'I', VERSION, 0xFF, 0xFF]), Err(PacketError::Length));
+    assert_eq!(
+        Header::decode([b'X', VERSION, 0, 0]),
+        Err(PacketError::Kind)
+    );
+    assert_eq!(
+        Header::decode([b'I', VERSION + 1, 0, 0]),
+        Err(PacketError::Version)
+    );
+    assert_eq!(
+        Header::decode([b'I', VERSION, 0xFF, 0xFF]),
+        Err(PacketError::Length)
+    );
 }
 
 #[test]
 fn the_longest_packet_has_room() {
     let frame = Frame::standard(0x7FF, &[0xFF; 8]).unwrap();
     let frames: Frames = core::iter::repeat_n(frame, MAX_FRAMES).collect();
-    let output = Output { drives: [Drive::Brake; 3], frames, lost: 1 };
+    let output = Output {
+        drives: [Drive::Brake; 3],
+        frames,
+        lost: 1,
+    };
     let packet = output.encode();
     assert_eq!(Output::decode(open(&packet, Kind::Output)), Ok(output));
 }
