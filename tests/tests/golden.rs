@@ -121,9 +121,9 @@ fn the_kernel_gives_the_golden_vectors_of_its_architecture() {
             let mut moment = [Torque::ZERO; 3];
             moment[axis] = one;
             let torques = direct.jacobian.torques(moment);
-            for motor in 0..3 {
-                let found = f64::from(torques[motor].to_q24()) / f64::from(1 << 24);
-                worst[3] = worst[3].max((found - line.torques[axis][motor]).abs());
+            for (torque, wanted) in torques.iter().zip(line.torques[axis]) {
+                let found = f64::from(torque.to_q24()) / f64::from(1 << 24);
+                worst[3] = worst[3].max((found - wanted).abs());
             }
         }
     }
