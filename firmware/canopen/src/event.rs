@@ -1,7 +1,5 @@
 //! What a node tells its owner.
 
-use heapless::Deque;
-
 use crate::{NmtCommand, NmtState};
 
 /// Something that happened, for the application, for logs and for tests.
@@ -44,34 +42,4 @@ pub enum Event {
         /// The RPDO, 1–4.
         number: u8,
     },
-}
-
-/// How many events wait to be polled.
-const EVENTS: usize = 16;
-
-/// Events in order. When it is full the oldest is forgotten, and counted.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct EventQueue {
-    events: Deque<Event, EVENTS>,
-    dropped: u32,
-}
-
-impl EventQueue {
-    #[inline(never)] // One copy in flash.
-    pub fn push(&mut self, event: Event) {
-        if self.events.is_full() {
-            self.events.pop_front();
-            self.dropped = self.dropped.saturating_add(1);
-        }
-        // There is room now.
-        let _ = self.events.push_back(event);
-    }
-
-    pub fn pop(&mut self) -> Option<Event> {
-        self.events.pop_front()
-    }
-
-    pub const fn dropped(&self) -> u32 {
-        self.dropped
-    }
 }

@@ -2,12 +2,14 @@
 
 use crate::communication::Communication;
 use crate::emergency::Fault;
-use crate::event::EventQueue;
 use crate::objects::Objects;
 use crate::pdo::Received;
 use crate::sdo::Server;
 use crate::transmit::TransmitQueue;
-use crate::{Application, Config, Event, Frame, Mapped, NmtCommand, NmtState};
+use crate::{Application, Config, Event, EventQueue, Frame, Mapped, NmtCommand, NmtState};
+
+/// How many events wait to be polled.
+const EVENTS: usize = 16;
 
 /// What a node had to give up, counted since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +41,7 @@ pub struct Node {
     communication: Communication,
     sdo: Server,
     transmit: TransmitQueue,
-    events: EventQueue,
+    events: EventQueue<Event, EVENTS>,
     rpdos_short: u32,
     rpdos_refused: u32,
     tpdos_refused: u32,

@@ -2,7 +2,6 @@
 
 use eel_protocol::emergency::EmergencyReport;
 use eel_protocol::{NodeId, State};
-use heapless::Deque;
 
 /// How many events wait to be polled: what ten nodes may do within a beat, twice.
 const EVENTS: usize = 64;
@@ -26,28 +25,5 @@ pub enum Event {
     Stopped,
 }
 
-/// Events in order. When it is full the oldest is forgotten, and counted.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct EventQueue {
-    events: Deque<Event, EVENTS>,
-    dropped: u32,
-}
-
-impl EventQueue {
-    pub fn push(&mut self, event: Event) {
-        if self.events.is_full() {
-            self.events.pop_front();
-            self.dropped = self.dropped.saturating_add(1);
-        }
-        // There is room now.
-        let _ = self.events.push_back(event);
-    }
-
-    pub fn pop(&mut self) -> Option<Event> {
-        self.events.pop_front()
-    }
-
-    pub const fn dropped(&self) -> u32 {
-        self.dropped
-    }
-}
+/// The head's events on their way to its owner.
+pub(crate) type EventQueue = eel_canopen::EventQueue<Event, EVENTS>;

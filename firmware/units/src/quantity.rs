@@ -2,6 +2,8 @@
 
 use core::ops::{Add, AddAssign, Neg, Sub, SubAssign};
 
+use crate::arithmetic::saturate;
+
 /// Defines a saturating quantity over `i32` with one raw constructor and one raw accessor.
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $from:ident, $to:ident, $unit:literal) => {
@@ -141,21 +143,21 @@ impl Angle {
 
     /// Makes an angle from milliradians; saturates beyond ±4 rad.
     pub const fn from_milliradians(raw: i32) -> Self {
-        Self(saturate_i32(((raw as i64) << 29) / 1_000))
+        Self(saturate(((raw as i64) << 29) / 1_000))
     }
 }
 
 impl AngularVelocity {
     /// Makes an angular velocity from mrad/s; saturates beyond ±128 rad/s.
     pub const fn from_milliradians_per_second(raw: i32) -> Self {
-        Self(saturate_i32(((raw as i64) << 24) / 1_000))
+        Self(saturate(((raw as i64) << 24) / 1_000))
     }
 }
 
 impl Torque {
     /// Makes a torque from mN·m, the unit of the wire; saturates beyond ±128 N·m.
     pub const fn from_millinewton_metres(raw: i32) -> Self {
-        Self(saturate_i32((raw as i64 * 1_099_511_628 + (1 << 15)) >> 16))
+        Self(saturate((raw as i64 * 1_099_511_628 + (1 << 15)) >> 16))
     }
 
     /// Returns the torque in mN·m, the unit of the wire, rounded to nearest and saturated.
@@ -185,17 +187,6 @@ const fn saturate_i16(value: i64) -> i16 {
         i16::MIN
     } else {
         value as i16
-    }
-}
-
-/// Returns the nearest `i32`, −2³¹ excepted, so that every value has an opposite.
-const fn saturate_i32(value: i64) -> i32 {
-    if value > i32::MAX as i64 {
-        i32::MAX
-    } else if value < -(i32::MAX as i64) {
-        -i32::MAX
-    } else {
-        value as i32
     }
 }
 

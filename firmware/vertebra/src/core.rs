@@ -1,5 +1,6 @@
 //! The vertebra behind its node: estimation, states, control, protection.
 
+use eel_canopen::EventQueue;
 use eel_kinematics::{Joints, Pose, PoseError};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, Mode, State, Status};
@@ -8,7 +9,7 @@ use eel_units::{Angle, Instant, Torque};
 use crate::command::{BRIDGED_PERIODS, CommandStream, Received};
 use crate::current::{CurrentState, Electrical};
 use crate::encoder::{Encoder, EncoderFault};
-use crate::events::{Event, EventQueue};
+use crate::events::{EVENTS, Event};
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
 use crate::limits::{MotorBounds, Situation, bounds};
@@ -61,7 +62,7 @@ pub(crate) struct Core {
     pub counters: Counters,
     pub timing: Timing,
     pub pending: Pending,
-    pub events: EventQueue,
+    pub events: EventQueue<Event, EVENTS>,
 }
 
 impl Core {
