@@ -83,8 +83,12 @@ const fn places() -> [i64; STATIONS] {
 
 impl Gait {
     /// The default: 1 Hz, tail amplitude 0.08 body lengths, wavelength 0.8 body lengths, lateral.
-    pub const SWIM: Self =
-        Self { frequency_mhz: 1_000, amplitude: 800, wavelength: 8_000, plane: Plane::Lateral };
+    pub const SWIM: Self = Self {
+        frequency_mhz: 1_000,
+        amplitude: 800,
+        wavelength: 8_000,
+        plane: Plane::Lateral,
+    };
 
     /// Makes a gait from its frequency in mHz, and from the amplitude of the tail edge and the
     /// length of the wave in 10⁻⁴ body lengths.
@@ -104,13 +108,23 @@ impl Gait {
         } else if !WAVELENGTHS.contains(&wavelength) {
             Err(GaitError::Wavelength)
         } else {
-            Ok(Self { frequency_mhz, amplitude, wavelength, plane })
+            Ok(Self {
+                frequency_mhz,
+                amplitude,
+                wavelength,
+                plane,
+            })
         }
     }
 
     /// Returns the length of a cycle in µs.
     pub const fn period_us(&self) -> u32 {
-        1_000_000_000 / if self.frequency_mhz == 0 { 1 } else { self.frequency_mhz }
+        1_000_000_000
+            / if self.frequency_mhz == 0 {
+                1
+            } else {
+                self.frequency_mhz
+            }
     }
 
     /// Returns the poses `elapsed_us` after the wave began, its amplitude scaled by `share` in
@@ -202,7 +216,10 @@ mod tests {
             let expected = oracle(1.25, 0.07, 0.9, micros as f64 / 1e6);
             for (pose, expected) in poses.iter().zip(expected) {
                 let yaw = f64::from(pose.yaw.to_q29()) / f64::from(1 << 29);
-                assert!((yaw - expected).abs() < 2e-7, "{step}: {yaw} against {expected}");
+                assert!(
+                    (yaw - expected).abs() < 2e-7,
+                    "{step}: {yaw} against {expected}"
+                );
                 assert_eq!((pose.pitch, pose.roll), (Angle::ZERO, Angle::ZERO));
             }
         }
@@ -212,7 +229,10 @@ mod tests {
     fn goes_on_without_a_seam_for_weeks() {
         let gait = Gait::SWIM;
         let week = 7 * 24 * 3_600 * 1_000_000_u64;
-        assert_eq!(gait.poses(week + 250_000, 1 << 15), gait.poses(250_000, 1 << 15));
+        assert_eq!(
+            gait.poses(week + 250_000, 1 << 15),
+            gait.poses(250_000, 1 << 15)
+        );
     }
 
     #[test]

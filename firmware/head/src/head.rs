@@ -23,6 +23,9 @@ const LONGEST_FADE_US: u32 = 2_000_000;
 const ONE: i64 = 1 << 15;
 /// How long the straight eel is held before its drives are switched off.
 const STRAIGHTENED: Duration = Duration::from_millis(500);
+/// Shortest and longest time between two SYNCs that vertebrae follow.
+const SYNC_PERIODS: (Duration, Duration) = (Duration::from_millis(5), Duration::from_millis(20));
+const HEARTBEAT_PERIOD: Duration = Duration::from_millis(HEAD_HEARTBEAT_MS as u32);
 /// How long "off" is sent before the nodes leave operation.
 const SWITCHED_OFF: Duration = Duration::from_millis(50);
 /// NMT commands (CiA 301, 7.2.8.3.1.1).
@@ -36,7 +39,7 @@ const OPERATIONAL: u8 = 5;
 pub struct Config {
     /// How the eel moves.
     pub gait: Gait,
-    /// Time between two SYNCs: 5–20 ms.
+    /// Time between two SYNCs, 5–20 ms; [`Head::new`] takes the nearest of these.
     pub sync_period: Duration,
     /// Which vertebrae are expected, bit 0 the first.
     pub expected: u16,
@@ -86,7 +89,9 @@ pub struct Head {
 
 impl Head {
     /// Starts a head that sends its first SYNC and heartbeat at once.
-    pub fn new(config: Config, now: Instant) -> Self {
+    pub fn new(mut config: Config, now: Instant) -> Self {
+        let (shortest, longest) = SYNC_PERIODS;
+        config.sync_period = config.sync_period.clamp(shortest, longest);
         let mut ids = NodeId::all();
         let first = NodeId::FIRST;
         Self {
@@ -108,11 +113,16 @@ impl Head {
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         let Some(id) = frame.cob_id() else { return };
         let cob = Cob::from_id(id);
-        let Some(node) = cob.node().and_then(NodeId::new) else { return };
-        let Some(tracker) = self.trackers.get_mut(node.index()) else { return };
+        let Some(node) = cob.node().and_then(NodeId::new) else {
+            return;
+        };
+        let Some(tracker) = self.trackers.get_mut(node.index()) else {
+            return;
+        };
         match (cob, frame.data()) {
             (Cob::Heartbeat(_), &[state]) => {
-                tracker.hear_heartbeat(now, state & 0x7F, &mut self.events);
+                let wanted = matches!(self.phase, Phase::Starting | Phase::Swimming);
+                tracker.hear_heartbeat(now, state & 0x7F, wanted, &mut self.events);
             }
             (Cob::Pose(_), _) => match PoseReport::from_frame(frame) {
                 Ok((_, report)) => tracker.hear_pose(now, &report, &mut self.events),
@@ -136,16 +146,14 @@ impl Head {
         }
         self.advance(now);
         if now >= self.next_heartbeat {
-            self.next_heartbeat = now + Duration::from_millis(u32::from(HEAD_HEARTBEAT_MS));
+            self.next_heartbeat = following(self.next_heartbeat, HEARTBEAT_PERIOD, now);
             self.send(Cob::Heartbeat(HEAD_NODE), &[OPERATIONAL]);
         }
-        if self.phase != Phase::Stopped {
+        if matches!(self.phase, Phase::Starting | Phase::Swimming) {
             self.start_nodes(now);
         }
         if now >= self.next_sync {
-            // The beat keeps its grid; only a long pause starts it anew.
-            let next = self.next_sync + self.config.sync_period;
-            self.next_sync = if next > now { next } else { now + self.config.sync_period };
+            self.next_sync = following(self.next_sync, self.config.sync_period, now);
             self.beat(now);
         }
     }
@@ -172,7 +180,7 @@ impl Head {
         }
     }
 
-    /// Acknowledges latched stops of all vertebrae. Whoever calls it knows that moving is safe.
+    /// Acknowledges the stops that are latched now. Whoever calls it knows that moving is safe.
     pub fn reset(&mut self) {
         for tracker in &mut self.trackers {
             tracker.reset();
@@ -191,7 +199,10 @@ impl Head {
 
     /// Returns how many vertebrae follow the gait.
     pub fn running(&self) -> usize {
-        self.trackers.iter().filter(|tracker| tracker.status().stage == Stage::Running).count()
+        self.trackers
+            .iter()
+            .filter(|tracker| tracker.status().stage == Stage::Running)
+            .count()
     }
 
     /// Returns how many frames found no room to wait.
@@ -203,7 +214,7 @@ impl Head {
     fn advance(&mut self, now: Instant) {
         let elapsed = now.since(self.since);
         match self.phase {
-            Phase::Starting if self.all_run() || elapsed >= PATIENCE && self.running() > 0 => {
+            Phase::Starting if self.running() > 0 && (self.all_run() || elapsed >= PATIENCE) => {
                 self.gait_start = Some(now);
                 self.events.push(Event::GaitStarted);
                 self.enter(now, Phase::Swimming);
@@ -237,7 +248,9 @@ impl Head {
 
     fn start_nodes(&mut self, now: Instant) {
         for index in 0..self.trackers.len() {
-            let Some(tracker) = self.trackers.get_mut(index) else { break };
+            let Some(tracker) = self.trackers.get_mut(index) else {
+                break;
+            };
             if tracker.wants_start(now) {
                 let id = tracker.id().get();
                 self.send(Cob::Nmt, &[NMT_START, id]);
@@ -247,16 +260,25 @@ impl Head {
 
     /// Sends SYNC, then the targets that the next SYNC will release.
     fn beat(&mut self, now: Instant) {
-        self.sync_counter =
-            if self.sync_counter >= SYNC_COUNTER_OVERFLOW { 1 } else { self.sync_counter + 1 };
+        self.sync_counter = if self.sync_counter >= SYNC_COUNTER_OVERFLOW {
+            1
+        } else {
+            self.sync_counter + 1
+        };
         self.send(Cob::Sync, &[self.sync_counter]);
         if self.phase == Phase::Stopped {
             return;
         }
-        let wish = if self.phase == Phase::SwitchingOff { Wish::Off } else { Wish::Run };
+        let wish = match self.phase {
+            Phase::Starting | Phase::Swimming => Wish::Run,
+            Phase::Straightening => Wish::Keep,
+            Phase::SwitchingOff | Phase::Stopped => Wish::Off,
+        };
         let poses = self.gait_poses(now);
         for (index, pose) in poses.into_iter().enumerate() {
-            let Some(tracker) = self.trackers.get_mut(index) else { break };
+            let Some(tracker) = self.trackers.get_mut(index) else {
+                break;
+            };
             if tracker.status().stage == Stage::Missing {
                 continue;
             }
@@ -270,7 +292,9 @@ impl Head {
 
     /// Returns the gait's poses at `now`, scaled by the start and the stop.
     fn gait_poses(&self, now: Instant) -> [Pose; VERTEBRAE as usize] {
-        let Some(start) = self.gait_start else { return [Pose::default(); VERTEBRAE as usize] };
+        let Some(start) = self.gait_start else {
+            return [Pose::default(); VERTEBRAE as usize];
+        };
         let fade = self.fade();
         let grown = share(self.gait_start, now, 2 * fade);
         let scale = match self.phase {
@@ -281,7 +305,9 @@ impl Head {
             }
             _ => 0,
         };
-        self.config.gait.poses(now.to_micros().saturating_sub(start.to_micros()), scale)
+        self.config
+            .gait
+            .poses(now.to_micros().saturating_sub(start.to_micros()), scale)
     }
 
     /// Returns how long the gait takes to fade out in µs: one cycle, at most two seconds.
@@ -300,6 +326,13 @@ impl Head {
             self.dropped = self.dropped.saturating_add(1);
         }
     }
+}
+
+/// Returns when something periodic that was due at `due` is due again. The beat keeps its grid; only
+/// a pause of a whole period starts it anew, so that nothing is sent in a burst.
+fn following(due: Instant, period: Duration, now: Instant) -> Instant {
+    let next = due + period;
+    if next > now { next } else { now + period }
 }
 
 /// Returns how far `now` is on a smooth step of `length_us` that began at `since`, in Q15.

@@ -12,6 +12,8 @@ const SILENCE: Duration = Duration::from_millis(500);
 const NMT_RETRY: Duration = Duration::from_millis(50);
 /// Time in which a vertebra is led from where it is to where the gait wants it.
 const BLEND: Duration = Duration::from_millis(1_000);
+/// "Off" targets before the first "run": one arms the vertebra, the others may get lost.
+const OFFS: u8 = 3;
 /// One in Q15.
 const ONE: i64 = 1 << 15;
 
@@ -37,7 +39,7 @@ pub enum Stage {
 pub struct NodeStatus {
     /// How far it is.
     pub stage: Stage,
-    /// The state that it last reported.
+    /// The state that it last reported; not ready while it is silent or has not started.
     pub state: State,
     /// The pose that it last reported.
     pub pose: Pose,
@@ -54,6 +56,8 @@ pub struct NodeStatus {
 pub(crate) enum Wish {
     /// Drives off.
     Off,
+    /// Those that run go on; no other begins.
+    Keep,
     /// Follow the targets.
     Run,
 }
@@ -104,29 +108,51 @@ impl Tracker {
         self.id
     }
 
-    /// Acknowledges a latched stop with the next target.
+    /// Acknowledges a stop that is latched now with the next target; never one that comes later.
     pub fn reset(&mut self) {
-        self.reset_wanted = true;
+        self.reset_wanted = self.status.stage == Stage::Latched;
     }
 
-    /// Takes a heartbeat or the boot-up message.
-    pub fn hear_heartbeat(&mut self, now: Instant, state: u8, events: &mut EventQueue) {
+    /// Enters a stage. What was counted or asked for in another holds no longer.
+    fn enter(&mut self, stage: Stage) {
+        self.status.stage = stage;
+        self.offs = 0;
+        self.reset_wanted = false;
+        if matches!(stage, Stage::Missing | Stage::Booted) {
+            self.status.state = State::NotReady;
+            self.report_counter = None;
+            self.commanded = None;
+        }
+    }
+
+    /// Takes a heartbeat or the boot-up message. `wanted` tells whether the node is to operate, so
+    /// that its leaving operation is news.
+    pub fn hear_heartbeat(
+        &mut self,
+        now: Instant,
+        state: u8,
+        wanted: bool,
+        events: &mut EventQueue,
+    ) {
         const BOOT_UP: u8 = 0;
         const OPERATIONAL: u8 = 5;
         self.heard = Some(now);
-        if state == BOOT_UP {
+        let outside = matches!(self.status.stage, Stage::Missing | Stage::Booted);
+        if state == OPERATIONAL {
+            if outside {
+                self.enter(Stage::Started);
+            }
+            return;
+        }
+        let boots = state == BOOT_UP;
+        if boots {
             self.status.boots = self.status.boots.saturating_add(1);
         }
-        if state == OPERATIONAL {
-            if matches!(self.status.stage, Stage::Missing | Stage::Booted) {
-                self.status.stage = Stage::Started;
-                self.offs = 0;
+        if boots || self.status.stage != Stage::Booted {
+            self.enter(Stage::Booted);
+            if boots || wanted {
+                events.push(Event::Booted(self.id));
             }
-        } else if self.status.stage != Stage::Booted {
-            self.status.stage = Stage::Booted;
-            self.report_counter = None;
-            self.commanded = None;
-            events.push(Event::Booted(self.id));
         }
     }
 
@@ -138,26 +164,29 @@ impl Tracker {
             self.status.lost_reports = self.status.lost_reports.saturating_add(skipped);
         }
         self.report_counter = Some(report.counter);
-        self.status.state = report.state;
-        self.status.pose = Pose { yaw: report.yaw, pitch: report.pitch, roll: report.roll };
-        let stage = self.status.stage;
-        if matches!(stage, Stage::Missing | Stage::Booted) {
-            self.status.stage = Stage::Started;
-            self.offs = 0;
+        if matches!(self.status.stage, Stage::Missing | Stage::Booted) {
+            self.enter(Stage::Started);
         }
-        if report.state.is_latched() {
-            if stage != Stage::Latched {
-                self.status.stage = Stage::Latched;
-                events.push(Event::Latched(self.id, report.state));
+        self.status.state = report.state;
+        self.status.pose = Pose {
+            yaw: report.yaw,
+            pitch: report.pitch,
+            roll: report.roll,
+        };
+        match (self.status.stage, report.state) {
+            (Stage::Latched, state) if state.is_latched() => {}
+            (_, state) if state.is_latched() => {
+                self.enter(Stage::Latched);
+                events.push(Event::Latched(self.id, state));
             }
-        } else if report.state == State::Run {
-            if stage == Stage::Enabling {
-                self.status.stage = Stage::Running;
+            (Stage::Enabling, State::Run) => {
+                self.enter(Stage::Running);
+                self.run_since = now;
                 events.push(Event::Running(self.id));
             }
-        } else if matches!(stage, Stage::Latched | Stage::Running) {
-            self.status.stage = Stage::Started;
-            self.offs = 0;
+            (Stage::Running, State::Run) | (Stage::Enabling, State::Ready) => {}
+            (Stage::Latched | Stage::Running | Stage::Enabling, _) => self.enter(Stage::Started),
+            _ => {}
         }
     }
 
@@ -169,14 +198,16 @@ impl Tracker {
     pub fn watch(&mut self, now: Instant, events: &mut EventQueue) {
         let silent = self.heard.is_none_or(|heard| now.since(heard) > SILENCE);
         if silent && self.status.stage != Stage::Missing {
-            self.status.stage = Stage::Missing;
+            self.enter(Stage::Missing);
             events.push(Event::Lost(self.id));
         }
     }
 
     /// Tells whether the node is to be sent NMT start now.
     pub fn wants_start(&mut self, now: Instant) -> bool {
-        let due = self.commanded.is_none_or(|sent| now.since(sent) >= NMT_RETRY);
+        let due = self
+            .commanded
+            .is_none_or(|sent| now.since(sent) >= NMT_RETRY);
         let wants = self.status.stage == Stage::Booted && due;
         if wants {
             self.commanded = Some(now);
@@ -187,37 +218,45 @@ impl Tracker {
     /// Returns the next target, `gait` being the pose that the gait wants.
     pub fn next_target(&mut self, now: Instant, wish: Wish, gait: Pose) -> Target {
         self.counter = self.counter.next();
-        let (mode, pose) = match self.status.stage {
-            _ if self.reset_wanted && self.status.stage == Stage::Latched => {
+        let (mode, pose) = match (self.status.stage, wish) {
+            (Stage::Latched, _) if self.reset_wanted => {
                 self.reset_wanted = false;
-                self.offs = 0;
                 (Mode::FaultReset, self.status.pose)
             }
-            Stage::Enabling | Stage::Running if wish == Wish::Run => {
-                (Mode::Run, self.blend(now, gait))
+            (Stage::Running, Wish::Run | Wish::Keep) => (Mode::Run, self.blend(now, gait)),
+            // Where it says it is, until it says that it runs: nothing jumps, whenever it begins.
+            (Stage::Enabling, Wish::Run) => (Mode::Run, self.hold()),
+            (Stage::Started, Wish::Run) if self.may_run() => {
+                self.enter(Stage::Enabling);
+                (Mode::Run, self.hold())
             }
-            Stage::Started if wish == Wish::Run && self.may_run() => {
-                self.status.stage = Stage::Enabling;
-                self.run_since = now;
-                self.start_pose = self.status.pose;
-                (Mode::Run, self.status.pose)
-            }
-            stage => {
+            (stage, _) => {
                 if matches!(stage, Stage::Enabling | Stage::Running) {
-                    self.status.stage = Stage::Started;
-                    self.offs = 0;
+                    self.enter(Stage::Started);
                 }
                 self.offs = self.offs.saturating_add(1);
                 (Mode::Off, self.status.pose)
             }
         };
         let Pose { yaw, pitch, roll } = pose;
-        Target { yaw, pitch, roll, mode, counter: self.counter }
+        Target {
+            yaw,
+            pitch,
+            roll,
+            mode,
+            counter: self.counter,
+        }
+    }
+
+    /// Returns the pose that the vertebra reports; from there it is led to the gait.
+    const fn hold(&mut self) -> Pose {
+        self.start_pose = self.status.pose;
+        self.start_pose
     }
 
     /// Tells whether the vertebra has seen "off" and is ready.
     const fn may_run(&self) -> bool {
-        self.offs >= 3 && matches!(self.status.state, State::Ready)
+        self.offs >= OFFS && matches!(self.status.state, State::Ready)
     }
 
     /// Returns the pose on the way from where the vertebra was to the gait.

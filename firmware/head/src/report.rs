@@ -9,7 +9,7 @@ const EVENTS: usize = 64;
 /// Something that happened on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A node booted and is being started.
+    /// A node booted, or was found outside operation; it is started unless the head is stopping.
     Booted(NodeId),
     /// A node follows the gait.
     Running(NodeId),
