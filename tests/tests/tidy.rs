@@ -66,18 +66,8 @@ const LOGIC: [&str; 7] = [
     "drivers",
 ];
 
-/// The most lines of a file, and the files that may have more, each with its reason.
+/// The most lines of a file.
 const LINES: usize = 500;
-const LONGER: &[(&str, &str)] = &[
-    (
-        "firmware/protocol/src/dictionary/table.rs",
-        "one table, one object after the other",
-    ),
-    (
-        "firmware/protocol/src/messages.rs",
-        "one table, one message after the other",
-    ),
-];
 
 /// The one file outside the boards that may hold unsafe: two instructions of the target, beside safe
 /// code that gives the same bits.
@@ -208,8 +198,7 @@ fn files_fit_in_a_head() {
     let mut found = Vec::new();
     for (path, text) in sources() {
         let lines = text.lines().count();
-        let may_be_longer = LONGER.iter().any(|(longer, _)| *longer == path);
-        if lines > LINES && !may_be_longer {
+        if lines > LINES {
             found.push(format!("{path} has {lines} lines, more than {LINES}"));
         }
     }
