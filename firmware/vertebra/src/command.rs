@@ -52,7 +52,11 @@ impl CommandStream {
     /// Starts without a target.
     pub const fn new(now: Instant) -> Self {
         Self {
-            counters: TargetCounters { bad: 0, lost: 0, repeated: 0 },
+            counters: TargetCounters {
+                bad: 0,
+                lost: 0,
+                repeated: 0,
+            },
             last: None,
             last_good: now,
             bad_in_a_row: 0,
@@ -69,7 +73,9 @@ impl CommandStream {
             Ok(target) => target,
             Err(error) => return self.reject(error),
         };
-        let repeated = self.last.is_some_and(|last| target.counter.since(last) == 0);
+        let repeated = self
+            .last
+            .is_some_and(|last| target.counter.since(last) == 0);
         if repeated {
             self.counters.repeated = self.counters.repeated.saturating_add(1);
             return Received::Ignored;
@@ -132,7 +138,11 @@ impl CommandStream {
     fn reject(&mut self, _error: FrameError) -> Received {
         self.counters.bad = self.counters.bad.saturating_add(1);
         self.bad_in_a_row = self.bad_in_a_row.saturating_add(1);
-        if self.bad_in_a_row == BAD_LIMIT { Received::TooManyBad } else { Received::Ignored }
+        if self.bad_in_a_row == BAD_LIMIT {
+            Received::TooManyBad
+        } else {
+            Received::Ignored
+        }
     }
 }
 
@@ -147,7 +157,14 @@ mod tests {
     fn target(counter: u8) -> [u8; 8] {
         let counter = Counter::new(counter).unwrap();
         let (yaw, pitch, roll) = (Angle::FRAC_PI_4, Angle::ZERO, Angle::ZERO);
-        Target { yaw, pitch, roll, mode: Mode::Run, counter }.to_bytes(COB)
+        Target {
+            yaw,
+            pitch,
+            roll,
+            mode: Mode::Run,
+            counter,
+        }
+        .to_bytes(COB)
     }
 
     fn at(millis: u64) -> Instant {
@@ -157,7 +174,10 @@ mod tests {
     #[test]
     fn a_repeated_frame_does_not_keep_the_stream_alive() {
         let mut stream = CommandStream::new(at(0));
-        assert!(matches!(stream.receive(at(1), &target(5), COB), Received::Target(_)));
+        assert!(matches!(
+            stream.receive(at(1), &target(5), COB),
+            Received::Target(_)
+        ));
         for time in 2..91 {
             assert_eq!(stream.receive(at(time), &target(5), COB), Received::Ignored);
             assert!(!stream.is_lost(at(time)));
@@ -181,7 +201,10 @@ mod tests {
         bad[3] ^= 0x10;
         assert_eq!(stream.receive(at(1), &bad, COB), Received::Ignored);
         assert_eq!(stream.receive(at(2), &bad, COB), Received::Ignored);
-        assert!(matches!(stream.receive(at(3), &target(1), COB), Received::Target(_)));
+        assert!(matches!(
+            stream.receive(at(3), &target(1), COB),
+            Received::Target(_)
+        ));
         assert_eq!(stream.receive(at(4), &bad, COB), Received::Ignored);
         assert_eq!(stream.receive(at(5), &bad, COB), Received::Ignored);
         assert_eq!(stream.receive(at(6), &bad, COB), Received::TooManyBad);
@@ -191,7 +214,10 @@ mod tests {
     #[test]
     fn a_target_under_a_wrong_identifier_is_bad() {
         let mut stream = CommandStream::new(at(0));
-        assert_eq!(stream.receive(at(1), &target(1), COB + 1), Received::Ignored);
+        assert_eq!(
+            stream.receive(at(1), &target(1), COB + 1),
+            Received::Ignored
+        );
         assert_eq!(stream.counters().bad, 1);
     }
 

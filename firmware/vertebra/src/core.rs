@@ -23,11 +23,18 @@ use crate::workspace::{Limited, admit};
 /// Deviation from the reference that is worth a warning: 150 mrad.
 const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
 /// Conditions that a fault reset can't clear because the reset itself, or time, does.
-const CLEARED_BY_RESET: [Condition; 4] =
-    [Condition::Latched, Condition::CommandLost, Condition::Encoders, Condition::NotOperational];
+const CLEARED_BY_RESET: [Condition; 4] = [
+    Condition::Latched,
+    Condition::CommandLost,
+    Condition::Encoders,
+    Condition::NotOperational,
+];
 /// Conditions that are told as warnings while they hold.
-const WARNINGS: [Condition; 3] =
-    [Condition::TargetLimited, Condition::CommandLate, Condition::FollowingError];
+const WARNINGS: [Condition; 3] = [
+    Condition::TargetLimited,
+    Condition::CommandLate,
+    Condition::FollowingError,
+];
 
 /// Everything of a vertebra but its node.
 #[derive(Clone, Debug)]
@@ -117,7 +124,8 @@ impl Core {
         self.bridge_missing_targets();
         let before = self.machine.state();
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
-        self.machine.advance(now, aligned, self.status.refusals().is_empty());
+        self.machine
+            .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
         let drives = self.drive(sample);
         self.report();
@@ -132,7 +140,9 @@ impl Core {
             self.encoders.iter_mut().zip(readings).enumerate()
         {
             let was_aligned = encoder.is_aligned();
-            let Err(fault) = encoder.update(count, absolute) else { continue };
+            let Err(fault) = encoder.update(count, absolute) else {
+                continue;
+            };
             if !was_aligned {
                 continue;
             }
@@ -167,8 +177,13 @@ impl Core {
     /// Returns where the wrist is and how it moves.
     fn moving(&self) -> Result<Motion, PoseError> {
         let [a, b, c] = &self.encoders;
-        let direct = self.settings.wrist.direct(&Joints([a.angle(), b.angle(), c.angle()]))?;
-        let omega = direct.jacobian.angular_velocity([a.speed(), b.speed(), c.speed()]);
+        let direct = self
+            .settings
+            .wrist
+            .direct(&Joints([a.angle(), b.angle(), c.angle()]))?;
+        let omega = direct
+            .jacobian
+            .angular_velocity([a.speed(), b.speed(), c.speed()]);
         Ok(Motion { direct, omega })
     }
 
@@ -182,7 +197,9 @@ impl Core {
 
     /// Tells the bus once that no warning holds any more.
     fn end_warnings(&mut self) {
-        let holds = WARNINGS.iter().any(|condition| self.status.contains(*condition));
+        let holds = WARNINGS
+            .iter()
+            .any(|condition| self.status.contains(*condition));
         if self.warned && !holds && !self.machine.state().is_latched() {
             self.emit(Emergency::CLEARED, Source::WHOLE);
         }
@@ -202,15 +219,22 @@ impl Core {
         if late && !self.status.contains(Condition::CommandLate) {
             self.emit(
                 Emergency::COMMAND_LATE,
-                Source { motor: 0, limit: 0, detail: u16::from(missed) },
+                Source {
+                    motor: 0,
+                    limit: 0,
+                    detail: u16::from(missed),
+                },
             );
         }
         self.status = self.status.with(Condition::CommandLate, late);
         if missed == 0 {
             return;
         }
-        let wanted =
-            if missed <= BRIDGED_PERIODS { self.spline.continued() } else { self.spline.newest() };
+        let wanted = if missed <= BRIDGED_PERIODS {
+            self.spline.continued()
+        } else {
+            self.spline.newest()
+        };
         self.follow(wanted);
     }
 
@@ -241,7 +265,11 @@ impl Core {
             self.note_limited(Limited::default());
             return;
         }
-        let wanted = Pose { yaw: target.yaw, pitch: target.pitch, roll: target.roll };
+        let wanted = Pose {
+            yaw: target.yaw,
+            pitch: target.pitch,
+            roll: target.roll,
+        };
         let limited = self.follow(wanted);
         self.note_limited(limited);
     }
@@ -250,7 +278,14 @@ impl Core {
     fn note_limited(&mut self, limited: Limited) {
         if limited.any() && !self.limited.any() {
             let detail = u16::from(limited.bits());
-            self.emit(Emergency::TARGET_LIMITED, Source { motor: 0, limit: 0, detail });
+            self.emit(
+                Emergency::TARGET_LIMITED,
+                Source {
+                    motor: 0,
+                    limit: 0,
+                    detail,
+                },
+            );
         }
         self.limited = limited;
         self.status = self.status.with(Condition::TargetLimited, limited.any());
@@ -261,8 +296,12 @@ impl Core {
         let before = self.machine.state();
         let standing = CLEARED_BY_RESET
             .iter()
-            .fold(self.status, |status, condition| status.with(*condition, false));
-        let outcome = self.machine.command(self.now, mode, standing.refusals().is_empty());
+            .fold(self.status, |status, condition| {
+                status.with(*condition, false)
+            });
+        let outcome = self
+            .machine
+            .command(self.now, mode, standing.refusals().is_empty());
         if outcome == Outcome::Reset {
             self.reset_faults();
         }
@@ -307,7 +346,9 @@ impl Core {
                 return [Drive::Off; 3];
             }
         };
-        let Some(motion) = self.motion else { return [Drive::Brake; 3] };
+        let Some(motion) = self.motion else {
+            return [Drive::Brake; 3];
+        };
         let moment = match self.machine.state() {
             State::Run => {
                 let (elapsed, period) = self.stream.place(self.now);
@@ -321,12 +362,25 @@ impl Core {
 
     /// Returns the moment towards a reference, and remembers how far off the wrist is.
     fn pull(&mut self, motion: &Motion, reference: Reference) -> [Torque; 3] {
-        let (moment, error) = self.impedance.moment(motion, &reference, &self.feed_forward);
+        let (moment, error) = self
+            .impedance
+            .moment(motion, &reference, &self.feed_forward);
         let far = error.iter().any(|axis| axis.abs() > FOLLOWING_LIMIT);
         if far && !self.status.contains(Condition::FollowingError) {
-            let worst = error.iter().map(|axis| axis.abs()).max().unwrap_or_default();
+            let worst = error
+                .iter()
+                .map(|axis| axis.abs())
+                .max()
+                .unwrap_or_default();
             let detail = worst.to_tenth_milliradians().unsigned_abs();
-            self.emit(Emergency::FOLLOWING_ERROR, Source { motor: 0, limit: 0, detail });
+            self.emit(
+                Emergency::FOLLOWING_ERROR,
+                Source {
+                    motor: 0,
+                    limit: 0,
+                    detail,
+                },
+            );
         }
         self.status = self.status.with(Condition::FollowingError, far);
         self.reference = Some(reference);
@@ -343,15 +397,26 @@ impl Core {
     ) -> [Drive; 3] {
         let angles = self.angles();
         let speeds = self.encoders.each_ref().map(Encoder::speed);
-        let situation = Situation { sample, angles, speeds, command_cap };
+        let situation = Situation {
+            sample,
+            angles,
+            speeds,
+            command_cap,
+        };
         let bounds: [MotorBounds; 3] = bounds(&self.settings.limits, &self.electrical, &situation);
-        let shared =
-            motion.direct.jacobian.share(moment, &bounds.each_ref().map(|motor| motor.torque));
+        let shared = motion
+            .direct
+            .jacobian
+            .share(moment, &bounds.each_ref().map(|motor| motor.torque));
         self.achieved = shared.achieved;
         self.unallocated = shared.unallocated;
         let mut limit = [LimitCode::None; 3];
         let mut drives = [Drive::Off; 3];
-        let motors = drives.iter_mut().zip(&mut limit).zip(&mut self.currents).zip(&bounds);
+        let motors = drives
+            .iter_mut()
+            .zip(&mut limit)
+            .zip(&mut self.currents)
+            .zip(&bounds);
         for (motor, (((drive, limit), state), bounds)) in motors.enumerate() {
             let pick = |values: &[Torque; 3]| values.get(motor).copied().unwrap_or_default();
             let speed = speeds.get(motor).copied().unwrap_or_default();
@@ -370,7 +435,9 @@ impl Core {
         let moment_limited = self.unallocated.iter().any(|axis| *axis != Torque::ZERO);
         self.status = self.status.with(Condition::MomentLimited, moment_limited);
         if let Some(sample) = &self.sample {
-            self.effort.torque = sample.current.map(|current| self.electrical.torque(current));
+            self.effort.torque = sample
+                .current
+                .map(|current| self.electrical.torque(current));
         }
         let holds = |condition| self.status.contains(condition);
         self.effort.flags = Flags {

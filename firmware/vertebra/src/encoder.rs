@@ -58,7 +58,11 @@ struct Observer {
 impl Encoder {
     /// Makes an encoder that knows nothing yet.
     pub const fn new(motor: &Motor) -> Self {
-        let counts = if motor.counts_per_turn == 0 { 1 } else { motor.counts_per_turn } as i64;
+        let counts = if motor.counts_per_turn == 0 {
+            1
+        } else {
+            motor.counts_per_turn
+        } as i64;
         // 2π in Q29 with 16 bits more, shared among the counts of a turn.
         let scale = 221_069_929_750_889 / counts;
         // rad/s × 1 ms in Q29, over the angle of a count, and one count more.
@@ -75,7 +79,10 @@ impl Encoder {
             zero: 0,
             implausible: 0,
             invalid: 0,
-            observer: Observer { position: 0, speed: 0 },
+            observer: Observer {
+                position: 0,
+                speed: 0,
+            },
         }
     }
 
@@ -108,7 +115,11 @@ impl Encoder {
                 false
             }
         };
-        self.implausible = if jumped || parted { self.implausible.saturating_add(1) } else { 0 };
+        self.implausible = if jumped || parted {
+            self.implausible.saturating_add(1)
+        } else {
+            0
+        };
         self.verdict()
     }
 
@@ -150,7 +161,10 @@ impl Encoder {
         self.align_count += 1;
         if self.is_aligned() {
             self.zero = self.align_sum / i64::from(ALIGN_SAMPLES);
-            self.observer = Observer { position: (self.zero + counted) << 8, speed: 0 };
+            self.observer = Observer {
+                position: (self.zero + counted) << 8,
+                speed: 0,
+            };
         }
         Ok(())
     }
@@ -205,7 +219,9 @@ mod tests {
         let mut encoder = Encoder::new(&Motor::PROTOTYPE);
         for _ in 0..ALIGN_SAMPLES {
             assert!(!encoder.is_aligned());
-            encoder.update(7_000, Some(Angle::from_milliradians(300))).unwrap();
+            encoder
+                .update(7_000, Some(Angle::from_milliradians(300)))
+                .unwrap();
         }
         assert!(encoder.is_aligned());
         encoder
@@ -252,7 +268,10 @@ mod tests {
     fn reports_a_jump_only_when_it_stays_implausible() {
         let mut encoder = aligned();
         for step in 1..=4 {
-            assert_eq!(encoder.update(7_000 + step * 5_000, Some(Angle::MAX)), Ok(()));
+            assert_eq!(
+                encoder.update(7_000 + step * 5_000, Some(Angle::MAX)),
+                Ok(())
+            );
         }
         let verdict = encoder.update(27_000 + 5_000, Some(Angle::MAX));
         assert_eq!(verdict, Err(EncoderFault::Implausible));
@@ -270,9 +289,13 @@ mod tests {
         let mut encoder = aligned();
         let mut state = 0x9E37_79B9_u64;
         for _ in 0..10_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             let count = (state >> 32) as i32;
-            encoder.update(count, Some(Angle::from_q29(state as i32))).ok();
+            encoder
+                .update(count, Some(Angle::from_q29(state as i32)))
+                .ok();
             let _ = (encoder.angle(), encoder.speed());
         }
     }

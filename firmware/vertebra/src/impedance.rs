@@ -33,14 +33,20 @@ pub struct FeedForward {
 
 impl FeedForward {
     /// Adds nothing and leaves the stiffness as it is set.
-    pub const NEUTRAL: Self = Self { moment: [Torque::ZERO; 3], stiffness: 1 << 15 };
+    pub const NEUTRAL: Self = Self {
+        moment: [Torque::ZERO; 3],
+        stiffness: 1 << 15,
+    };
 }
 
 impl Impedance {
     /// Prepares gains.
     pub fn new(gains: &Gains) -> Self {
         let prepare = |milli: u32| (i64::from(milli) << 16) / 1_000;
-        Self { stiffness: gains.stiffness.map(prepare), damping: gains.damping.map(prepare) }
+        Self {
+            stiffness: gains.stiffness.map(prepare),
+            damping: gains.damping.map(prepare),
+        }
     }
 
     /// Returns the moment towards `reference`, and the rotation vector that leads there.
@@ -60,7 +66,10 @@ impl Impedance {
         });
         let damper = self.damper(omega, motion.omega);
         let [s, d, f] = [spring, damper, feed.moment];
-        ([s[0] + d[0] + f[0], s[1] + d[1] + f[1], s[2] + d[2] + f[2]], error)
+        (
+            [s[0] + d[0] + f[0], s[1] + d[1] + f[1], s[2] + d[2] + f[2]],
+            error,
+        )
     }
 
     /// Returns the moment that brings the motion to rest.
@@ -71,7 +80,9 @@ impl Impedance {
     fn damper(&self, wanted: [AngularVelocity; 3], measured: [AngularVelocity; 3]) -> [Torque; 3] {
         let [w, m] = [wanted, measured];
         let slip = [w[0] - m[0], w[1] - m[1], w[2] - m[2]];
-        product(self.damping, slip.map(AngularVelocity::to_q24), |torque| torque >> 16)
+        product(self.damping, slip.map(AngularVelocity::to_q24), |torque| {
+            torque >> 16
+        })
     }
 }
 
@@ -80,5 +91,9 @@ fn product(gains: [i64; 3], values: [i32; 3], scale: impl Fn(i64) -> i64) -> [To
     let axis = |gain: i64, value: i32| {
         Torque::from_q24(saturate(scale(gain.saturating_mul(i64::from(value)))))
     };
-    [axis(gains[0], values[0]), axis(gains[1], values[1]), axis(gains[2], values[2])]
+    [
+        axis(gains[0], values[0]),
+        axis(gains[1], values[1]),
+        axis(gains[2], values[2]),
+    ]
 }

@@ -26,7 +26,14 @@ impl MotorBounds {
     /// Starts from a symmetric bound.
     fn symmetric(bound: Torque, code: LimitCode) -> Self {
         let bound = bound.abs();
-        Self { torque: Bounds { low: -bound, high: bound }, low_code: code, high_code: code }
+        Self {
+            torque: Bounds {
+                low: -bound,
+                high: bound,
+            },
+            low_code: code,
+            high_code: code,
+        }
     }
 
     /// Lowers the upper bound, but not below nothing.
@@ -126,12 +133,20 @@ fn ramp_share(room: Angle) -> i64 {
 
 /// Returns how far `value` is from `from` (0) to `to` (1), Q15.
 fn falling(from: Voltage, to: Voltage, value: Voltage) -> i64 {
-    fraction(from.to_millivolts(), to.to_millivolts(), value.to_millivolts())
+    fraction(
+        from.to_millivolts(),
+        to.to_millivolts(),
+        value.to_millivolts(),
+    )
 }
 
 /// Returns how far a temperature is from the start of a ramp (0) to its end (1), Q15.
 fn share(ramp: Ramp<Temperature>, value: Temperature) -> i64 {
-    fraction(ramp.start.to_decidegrees(), ramp.end.to_decidegrees(), value.to_decidegrees())
+    fraction(
+        ramp.start.to_decidegrees(),
+        ramp.end.to_decidegrees(),
+        value.to_decidegrees(),
+    )
 }
 
 fn fraction(from: i32, to: i32, value: i32) -> i64 {

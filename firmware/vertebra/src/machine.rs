@@ -62,7 +62,10 @@ impl Machine {
 
     /// Tells whether the bridges are, or may be, driven.
     pub const fn is_enabled(&self) -> bool {
-        matches!(self.state, State::Run | State::Hold | State::Damped | State::Brake)
+        matches!(
+            self.state,
+            State::Run | State::Hold | State::Damped | State::Brake
+        )
     }
 
     /// Takes the mode of a target frame. A latched state stays while `cleared` is false.
@@ -207,10 +210,19 @@ mod tests {
         let mut machine = running();
         assert!(machine.emergency_stop(at(2)));
         assert_eq!(machine.command(at(3), Mode::Off, true), Outcome::Refused);
-        assert_eq!(machine.command(at(4), Mode::FaultReset, false), Outcome::Refused);
-        assert_eq!(machine.command(at(5), Mode::FaultReset, true), Outcome::Refused);
+        assert_eq!(
+            machine.command(at(4), Mode::FaultReset, false),
+            Outcome::Refused
+        );
+        assert_eq!(
+            machine.command(at(5), Mode::FaultReset, true),
+            Outcome::Refused
+        );
         assert_eq!(machine.command(at(6), Mode::Off, true), Outcome::Refused);
-        assert_eq!(machine.command(at(7), Mode::FaultReset, true), Outcome::Reset);
+        assert_eq!(
+            machine.command(at(7), Mode::FaultReset, true),
+            Outcome::Reset
+        );
         machine.advance(at(7), true, true);
         assert_eq!(machine.command(at(8), Mode::Run, true), Outcome::Refused);
         assert_eq!(machine.command(at(9), Mode::Off, true), Outcome::Done);

@@ -31,13 +31,22 @@ impl Pending {
     /// Notes a fault of motor 0–2 or of the whole wrist; the first one since the last reset counts.
     pub fn fault(&mut self, emergency: Emergency, motor: Option<usize>, detail: u16) {
         let number = motor.map_or(0, |motor| motor as u8 + 1);
-        if matches!(emergency, Emergency::ENCODER_INVALID | Emergency::ENCODER_IMPLAUSIBLE)
-            && let Some(failed) = motor.and_then(|motor| self.failed_encoders.get_mut(motor))
+        if matches!(
+            emergency,
+            Emergency::ENCODER_INVALID | Emergency::ENCODER_IMPLAUSIBLE
+        ) && let Some(failed) = motor.and_then(|motor| self.failed_encoders.get_mut(motor))
         {
             *failed = true;
         }
         if self.fault.is_none() {
-            self.fault = Some((emergency, Source { motor: number, limit: 0, detail }));
+            self.fault = Some((
+                emergency,
+                Source {
+                    motor: number,
+                    limit: 0,
+                    detail,
+                },
+            ));
         }
     }
 

@@ -1,8 +1,8 @@
 //! What makes a vertebra let go: limits of what it measures, loss of command, stops and faults.
 
+use eel_kinematics::Joints;
 use eel_protocol::Condition;
 use eel_protocol::emergency::{Emergency, Source};
-use eel_kinematics::Joints;
 use eel_units::{Angle, Temperature, Torque};
 
 use crate::command::TARGET_TIMEOUT;
@@ -30,7 +30,9 @@ impl Core {
             self.stop(Emergency::COMMAND_LOST, TARGET_TIMEOUT.to_micros() / 1_000);
             self.status = self.status.with(Condition::CommandLost, true);
         }
-        self.status = self.status.with(Condition::Latched, self.machine.state().is_latched());
+        self.status = self
+            .status
+            .with(Condition::Latched, self.machine.state().is_latched());
     }
 
     /// Notes what stands against enabling.
@@ -39,9 +41,12 @@ impl Core {
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
         let believable = self.motion.is_some() && is_believable(&self.pose, limits);
         let hot = sample.board_temperature >= limits.board_hot.end
-            || sample.motor_temperature.iter().any(|value| *value >= limits.motor_hot.end);
-        let voltage = sample.supply <= limits.supply_low.end
-            || sample.supply >= limits.supply_high.end;
+            || sample
+                .motor_temperature
+                .iter()
+                .any(|value| *value >= limits.motor_hot.end);
+        let voltage =
+            sample.supply <= limits.supply_low.end || sample.supply >= limits.supply_high.end;
         self.status = self
             .status
             .with(Condition::Settings, !self.settings.are_sound())
@@ -69,19 +74,23 @@ impl Core {
         let limits = &self.settings.limits;
         let centivolts = (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
         if sample.supply <= limits.supply_low.end {
-            self.pending.fault(Emergency::UNDER_VOLTAGE, None, centivolts);
+            self.pending
+                .fault(Emergency::UNDER_VOLTAGE, None, centivolts);
         } else if sample.supply >= limits.supply_high.end {
-            self.pending.fault(Emergency::OVER_VOLTAGE, None, centivolts);
+            self.pending
+                .fault(Emergency::OVER_VOLTAGE, None, centivolts);
         }
         let decidegrees = |value: Temperature| value.to_decidegrees() as u16;
         if sample.board_temperature >= limits.board_hot.end {
             let detail = decidegrees(sample.board_temperature);
-            self.pending.fault(Emergency::BOARD_OVER_TEMPERATURE, None, detail);
+            self.pending
+                .fault(Emergency::BOARD_OVER_TEMPERATURE, None, detail);
         }
         for (motor, value) in sample.motor_temperature.into_iter().enumerate() {
             if value >= limits.motor_hot.end {
                 let detail = decidegrees(value);
-                self.pending.fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
+                self.pending
+                    .fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
             }
         }
         self.find_over_current(sample);
@@ -94,10 +103,15 @@ impl Core {
         let readings = sample.current.into_iter().zip(&mut self.over_current_ticks);
         for (motor, (current, ticks)) in readings.enumerate() {
             let magnitude = current.abs().to_microamps();
-            *ticks = if magnitude > hard { ticks.saturating_add(1) } else { 0 };
+            *ticks = if magnitude > hard {
+                ticks.saturating_add(1)
+            } else {
+                0
+            };
             if *ticks >= OVER_CURRENT_TICKS {
                 let milliamps = (magnitude / 1_000).min(0xFFFF) as u16;
-                self.pending.fault(Emergency::OVER_CURRENT, Some(motor), milliamps);
+                self.pending
+                    .fault(Emergency::OVER_CURRENT, Some(motor), milliamps);
             }
         }
     }
@@ -109,7 +123,10 @@ impl Core {
             Ok(inverse) => {
                 let Joints(expected) = inverse.joints;
                 let parts = expected.into_iter().zip(self.angles());
-                parts.map(|(one, other)| (one - other).abs()).max().unwrap_or_default()
+                parts
+                    .map(|(one, other)| (one - other).abs())
+                    .max()
+                    .unwrap_or_default()
             }
             Err(_) => Angle::MAX,
         };
@@ -123,7 +140,9 @@ impl Core {
 
     /// Enters the fault state for the first fault that waits.
     pub fn take_faults(&mut self) {
-        let Some((emergency, source)) = self.pending.first_fault() else { return };
+        let Some((emergency, source)) = self.pending.first_fault() else {
+            return;
+        };
         let before = self.machine.state();
         let motor = usize::from(source.motor).checked_sub(1);
         if self.machine.fault(self.now, motor) {
@@ -149,7 +168,14 @@ impl Core {
         let before = self.machine.state();
         if self.machine.stop(self.now) {
             let detail = detail.min(0xFFFF) as u16;
-            self.emit(emergency, Source { motor: 0, limit: 0, detail });
+            self.emit(
+                emergency,
+                Source {
+                    motor: 0,
+                    limit: 0,
+                    detail,
+                },
+            );
         }
         self.note_state(before);
     }
@@ -199,7 +225,11 @@ impl Core {
             return [Drive::Off; 3];
         }
         let mut drives = [Drive::Brake; 3];
-        if let Some(drive) = self.machine.faulty_motor().and_then(|motor| drives.get_mut(motor)) {
+        if let Some(drive) = self
+            .machine
+            .faulty_motor()
+            .and_then(|motor| drives.get_mut(motor))
+        {
             *drive = Drive::Off;
         }
         drives

@@ -106,7 +106,13 @@ impl Settings {
 
     /// Tells whether the settings contradict neither themselves nor physics.
     pub fn are_sound(&self) -> bool {
-        let Limits { workspace, travel, supply_low, supply_high, .. } = &self.limits;
+        let Limits {
+            workspace,
+            travel,
+            supply_low,
+            supply_high,
+            ..
+        } = &self.limits;
         let positive = [workspace.yaw, workspace.pitch, workspace.roll]
             .into_iter()
             .all(|range| range > Angle::ZERO && range < Angle::FRAC_PI_2);
@@ -124,8 +130,10 @@ impl Settings {
 
 impl Gains {
     /// The prototype's: stiff enough for half a degree of error at 3.5 N·m.
-    pub const PROTOTYPE: Self =
-        Self { stiffness: [400_000, 400_000, 250_000], damping: [6_000, 6_000, 3_000] };
+    pub const PROTOTYPE: Self = Self {
+        stiffness: [400_000, 400_000, 250_000],
+        damping: [6_000, 6_000, 3_000],
+    };
 }
 
 impl Limits {
@@ -139,9 +147,18 @@ impl Limits {
         },
         rate: AngularVelocity::from_milliradians_per_second(6_000),
         travel: [
-            Travel { low: Angle::from_milliradians(-900), high: Angle::from_milliradians(900) },
-            Travel { low: Angle::from_milliradians(-900), high: Angle::from_milliradians(900) },
-            Travel { low: Angle::from_milliradians(520), high: Angle::from_milliradians(1_050) },
+            Travel {
+                low: Angle::from_milliradians(-900),
+                high: Angle::from_milliradians(900),
+            },
+            Travel {
+                low: Angle::from_milliradians(-900),
+                high: Angle::from_milliradians(900),
+            },
+            Travel {
+                low: Angle::from_milliradians(520),
+                high: Angle::from_milliradians(1_050),
+            },
         ],
         damped_torque: Torque::from_millinewton_metres(1_000),
         supply_low: Ramp {

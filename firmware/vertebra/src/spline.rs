@@ -29,7 +29,10 @@ pub struct Reference {
 impl Reference {
     /// Makes a reference that stays at `pose`.
     pub const fn at_rest(pose: Pose) -> Self {
-        Self { pose, rates: [AngularVelocity::ZERO; 3] }
+        Self {
+            pose,
+            rates: [AngularVelocity::ZERO; 3],
+        }
     }
 }
 
@@ -71,7 +74,10 @@ impl Spline {
         let (yaw, yaw_rate) = axis([a.yaw, b.yaw, c.yaw], place, per_second);
         let (pitch, pitch_rate) = axis([a.pitch, b.pitch, c.pitch], place, per_second);
         let (roll, roll_rate) = axis([a.roll, b.roll, c.roll], place, per_second);
-        Reference { pose: Pose { yaw, pitch, roll }, rates: [yaw_rate, pitch_rate, roll_rate] }
+        Reference {
+            pose: Pose { yaw, pitch, roll },
+            rates: [yaw_rate, pitch_rate, roll_rate],
+        }
     }
 }
 
@@ -85,7 +91,10 @@ fn axis(knots: [Angle; 3], place: i64, per_second: i64) -> (Angle, AngularVeloci
     let slope = first + bend;
     // Q29 rad a segment × Q4 segments a second is Q33 rad/s; the quantity is Q24.
     let rate = (slope * per_second) >> 9;
-    (Angle::from_q29(saturate(doubled >> 1)), AngularVelocity::from_q24(saturate(rate)))
+    (
+        Angle::from_q29(saturate(doubled >> 1)),
+        AngularVelocity::from_q24(saturate(rate)),
+    )
 }
 
 #[cfg(test)]
@@ -95,7 +104,10 @@ mod tests {
     const PERIOD: Duration = Duration::from_millis(10);
 
     fn yaw(milliradians: i32) -> Pose {
-        Pose { yaw: Angle::from_milliradians(milliradians), ..Pose::default() }
+        Pose {
+            yaw: Angle::from_milliradians(milliradians),
+            ..Pose::default()
+        }
     }
 
     #[test]
@@ -105,7 +117,10 @@ mod tests {
         for target in [30, 55, -20, -20, 400] {
             spline.push(yaw(target));
             let start = spline.reference(Duration::ZERO, PERIOD);
-            assert!((start.pose.yaw - last.pose.yaw).abs() <= Angle::from_q29(2), "{target}");
+            assert!(
+                (start.pose.yaw - last.pose.yaw).abs() <= Angle::from_q29(2),
+                "{target}"
+            );
             let step = (start.rates[0] - last.rates[0]).abs();
             assert!(step <= AngularVelocity::from_q24(16), "{target}: {step:?}");
             last = spline.reference(PERIOD, PERIOD);
@@ -128,12 +143,20 @@ mod tests {
         let mut spline = Spline::at_rest(yaw(10));
         spline.push(yaw(40));
         spline.push(yaw(100));
-        let [before, after] = [3_000, 5_000]
-            .map(|t| spline.reference(Duration::from_micros(t), PERIOD).pose.yaw.to_q29());
+        let [before, after] = [3_000, 5_000].map(|t| {
+            spline
+                .reference(Duration::from_micros(t), PERIOD)
+                .pose
+                .yaw
+                .to_q29()
+        });
         let difference = f64::from(after - before) / f64::from(1 << 29) / 2e-3;
         let rate = spline.reference(Duration::from_micros(4_000), PERIOD).rates[0];
         let rate = f64::from(rate.to_q24()) / f64::from(1 << 24);
-        assert!((rate - difference).abs() < 2e-3, "{rate} against {difference}");
+        assert!(
+            (rate - difference).abs() < 2e-3,
+            "{rate} against {difference}"
+        );
     }
 
     #[test]
@@ -143,7 +166,10 @@ mod tests {
             spline.push(yaw(target));
             for micros in (0..=10_000).step_by(100) {
                 let pose = spline.reference(Duration::from_micros(micros), PERIOD).pose;
-                assert!(pose.yaw.abs() <= Angle::from_milliradians(500), "{micros}: {pose:?}");
+                assert!(
+                    pose.yaw.abs() <= Angle::from_milliradians(500),
+                    "{micros}: {pose:?}"
+                );
             }
         }
     }

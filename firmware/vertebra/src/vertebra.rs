@@ -42,13 +42,17 @@ impl Vertebra {
     /// Starts a vertebra at power-up: drives off, boot-up message waiting.
     pub fn new(settings: Settings, now: Instant) -> Self {
         let node = Node::new(config(&settings), now.to_micros());
-        Self { node, core: Core::new(settings, now) }
+        Self {
+            node,
+            core: Core::new(settings, now),
+        }
     }
 
     /// Takes a frame from the bus.
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         self.core.now = now;
-        self.node.handle_frame(now.to_micros(), frame, &mut self.core);
+        self.node
+            .handle_frame(now.to_micros(), frame, &mut self.core);
         self.absorb_events(now);
         self.hand_over_emergencies(now);
     }
@@ -160,7 +164,8 @@ impl Vertebra {
                 self.node.emergency_cleared(now.to_micros(), 0xFF);
                 continue;
             }
-            self.node.emergency(now.to_micros(), code, register, Source::to_bytes(source));
+            self.node
+                .emergency(now.to_micros(), code, register, Source::to_bytes(source));
         }
     }
 }

@@ -116,7 +116,10 @@ mod tests {
     }
 
     fn yaw(milliradians: i32) -> Pose {
-        Pose { yaw: Angle::from_milliradians(milliradians), ..Pose::default() }
+        Pose {
+            yaw: Angle::from_milliradians(milliradians),
+            ..Pose::default()
+        }
     }
 
     fn admitted(wanted: Pose, previous: Pose) -> (Pose, Limited) {
@@ -166,7 +169,11 @@ mod tests {
         let extremes = [i32::MIN, -1, 0, 1, i32::MAX].map(Angle::from_q29);
         for yaw in extremes {
             for pitch in extremes {
-                let pose = Pose { yaw, pitch, roll: pitch };
+                let pose = Pose {
+                    yaw,
+                    pitch,
+                    roll: pitch,
+                };
                 let (admitted, _) = admitted(pose, Pose::default());
                 assert!(is_believable(&admitted, &settings().limits));
             }
