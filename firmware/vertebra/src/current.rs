@@ -15,6 +15,11 @@ const INTEGRAL_LIMIT_MV: i64 = 3_000;
 /// Least supply that a duty is computed for.
 const SUPPLY_FLOOR_MV: i64 = 1_000;
 
+/// Torque constants in µN·m/A that the products below have room for: 1 mN·m/A to 100 N·m/A.
+pub const TORQUE_CONSTANTS: (u32, u32) = (1_000, 100_000_000);
+/// Resistances in mΩ that they have room for: 1 mΩ to 1 kΩ.
+pub const RESISTANCES: (u32, u32) = (1, 1_000_000);
+
 /// A motor's constants, prepared for the tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Electrical {
@@ -40,10 +45,10 @@ pub struct CurrentState {
 }
 
 impl Electrical {
-    /// Prepares the constants; zeros in the settings become the smallest sensible values.
+    /// Prepares the constants; what is out of range is moved to its end.
     pub const fn new(motor: &Motor) -> Self {
-        let constant = at_least_one(motor.torque_constant);
-        let resistance = at_least_one(motor.resistance);
+        let constant = within(motor.torque_constant, TORQUE_CONSTANTS);
+        let resistance = within(motor.resistance, RESISTANCES);
         Self {
             microamps_per_newton_metre: 1_000_000_000_000 / constant,
             // 2⁴⁴ / 10¹² = 17.592186.
@@ -107,8 +112,14 @@ impl Electrical {
     }
 }
 
-const fn at_least_one(value: u32) -> i64 {
-    if value == 0 { 1 } else { value as i64 }
+const fn within(value: u32, (least, most): (u32, u32)) -> i64 {
+    if value < least {
+        least as i64
+    } else if value > most {
+        most as i64
+    } else {
+        value as i64
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +133,7 @@ mod tests {
     }
 
     /// The winding: the current that a duty drives at a speed, with another resistance than set.
+    #[expect(clippy::float_arithmetic, reason = "tests only")]
     fn winding(duty: Duty, speed: f64, resistance: f64) -> f64 {
         let voltage = 24.0 * f64::from(duty.to_q15()) / 32_767.0;
         (voltage - 1.488 * speed) / resistance

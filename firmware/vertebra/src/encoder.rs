@@ -66,7 +66,7 @@ impl Encoder {
         // 2π in Q29 with 16 bits more, shared among the counts of a turn.
         let scale = 221_069_929_750_889 / counts;
         // rad/s × 1 ms in Q29, over the angle of a count, and one count more.
-        let tick_angle = (motor.speed_limit.to_q24() as i64 * TICK) >> 16;
+        let tick_angle = (motor.speed_limit.abs().to_q24() as i64 * TICK) >> 16;
         let step = (tick_angle << 16) / if scale > 0 { scale } else { 1 } + 1;
         Self {
             scale,
@@ -227,6 +227,7 @@ mod tests {
         encoder
     }
 
+    #[expect(clippy::float_arithmetic, reason = "tests only")]
     fn radians(angle: Angle) -> f64 {
         f64::from(angle.to_q29()) / f64::from(1 << 29)
     }

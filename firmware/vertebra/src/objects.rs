@@ -3,10 +3,11 @@
 use eel_canopen::{Abort, Application, Entry};
 use eel_protocol::PoseReport;
 use eel_protocol::dictionary::{self, Field};
-use eel_units::{Angle, Duration, Instant, Torque};
+use eel_units::{Angle, AngularVelocity, Duration, Instant, Temperature, Torque};
 
 use crate::core::Core;
 use crate::impedance::Impedance;
+use crate::io::Sample;
 
 /// Microradians in a radian.
 const MICRO: i64 = 1_000_000;
@@ -73,6 +74,7 @@ impl Timing {
 impl Core {
     /// Returns the raw number of a field; too large a one is saturated where it is encoded.
     fn value(&self, field: Field) -> i64 {
+        let (gains, limits) = (&self.settings.gains, &self.settings.limits);
         match field {
             Field::TargetYaw => i64::from(self.target.angles[0]),
             Field::TargetPitch => i64::from(self.target.angles[1]),
@@ -92,10 +94,7 @@ impl Core {
             Field::EffortMotor1 => millis(self.effort.torque[0]),
             Field::EffortMotor2 => millis(self.effort.torque[1]),
             Field::EffortMotor3 => millis(self.effort.torque[2]),
-            Field::EffortLimits => {
-                let [.., low, high] = self.effort.to_bytes();
-                i64::from(u16::from_le_bytes([low, high]))
-            }
+            Field::EffortLimits => i64::from(self.effort.limits()),
             Field::MotorAngle1 => microradians(self.angles()[0]),
             Field::MotorAngle2 => microradians(self.angles()[1]),
             Field::MotorAngle3 => microradians(self.angles()[2]),
@@ -105,16 +104,6 @@ impl Core {
             Field::UnallocatedX => millis(self.unallocated[0]),
             Field::UnallocatedY => millis(self.unallocated[1]),
             Field::UnallocatedZ => millis(self.unallocated[2]),
-            _ => self.setting_or_measurement(field),
-        }
-    }
-
-    /// Returns the raw number of the slower fields.
-    fn setting_or_measurement(&self, field: Field) -> i64 {
-        let (gains, limits) = (&self.settings.gains, &self.settings.limits);
-        let wire = |angle: Angle| i64::from(angle.to_tenth_milliradians());
-        let stream = self.stream.counters();
-        match field {
             Field::StiffnessX => i64::from(gains.stiffness[0]),
             Field::StiffnessY => i64::from(gains.stiffness[1]),
             Field::StiffnessZ => i64::from(gains.stiffness[2]),
@@ -122,35 +111,32 @@ impl Core {
             Field::DampingY => i64::from(gains.damping[1]),
             Field::DampingZ => i64::from(gains.damping[2]),
             Field::PeakTorque => millis(limits.peak_torque),
-            Field::RangeYaw => wire(limits.workspace.yaw),
-            Field::RangePitch => wire(limits.workspace.pitch),
-            Field::RangeRoll => wire(limits.workspace.roll),
+            Field::RangeYaw => i64::from(limits.workspace.yaw.to_tenth_milliradians()),
+            Field::RangePitch => i64::from(limits.workspace.pitch.to_tenth_milliradians()),
+            Field::RangeRoll => i64::from(limits.workspace.roll.to_tenth_milliradians()),
             Field::RateLimit => (i64::from(limits.rate.to_q24()) * 1_000 + (1 << 23)) >> 24,
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
-            Field::BadTargets => i64::from(stream.bad),
-            Field::LostTargets => i64::from(stream.lost),
+            Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
+            Field::BoardTemperature => self.measured(|sample| tenths(sample.board_temperature)),
+            Field::MotorTemperature1 => self.measured(|sample| tenths(sample.motor_temperature[0])),
+            Field::MotorTemperature2 => self.measured(|sample| tenths(sample.motor_temperature[1])),
+            Field::MotorTemperature3 => self.measured(|sample| tenths(sample.motor_temperature[2])),
+            Field::BadTargets => i64::from(self.stream.counters().bad),
+            Field::LostTargets => i64::from(self.stream.counters().lost),
             Field::ReceiveOverruns => i64::from(self.counters.receive_overruns),
             Field::TransmitOverruns => i64::from(self.counters.transmit_overruns),
             Field::LoopLast => i64::from(self.timing.loop_last.to_micros()),
             Field::LoopMax => i64::from(self.timing.loop_max.to_micros()),
             Field::SyncPhase => self.timing.sync_phase_us,
-            _ => self.measurement(field),
         }
     }
 
-    /// Returns what the last sample said; nothing before the first.
-    fn measurement(&self, field: Field) -> i64 {
-        let Some(sample) = &self.sample else { return 0 };
-        let motor = |index: usize| i64::from(sample.motor_temperature[index].to_decidegrees());
-        match field {
-            Field::Supply => i64::from(sample.supply.to_millivolts()),
-            Field::BoardTemperature => i64::from(sample.board_temperature.to_decidegrees()),
-            Field::MotorTemperature1 => motor(0),
-            Field::MotorTemperature2 => motor(1),
-            Field::MotorTemperature3 => motor(2),
-            _ => 0,
-        }
+    /// Returns a number of the last sample; nothing before the first.
+    fn measured(&self, pick: impl Fn(&Sample) -> i32) -> i64 {
+        self.sample
+            .as_ref()
+            .map_or(0, |sample| i64::from(pick(sample)))
     }
 
     fn pose_word(&self, at: usize) -> i64 {
@@ -176,9 +162,9 @@ impl Core {
         Ok(())
     }
 
-    /// Writes a setting, which is refused while the drives are on.
+    /// Writes a setting, which is refused while the drives are on, a stop included.
     fn set_setting(&mut self, field: Field, value: i64) -> Result<(), Abort> {
-        if self.machine.is_enabled() {
+        if self.machine.is_enabled() || self.machine.is_stopping() {
             return Err(Abort::DeviceState);
         }
         let angle = Angle::from_tenth_milliradians(value as i16);
@@ -195,8 +181,7 @@ impl Core {
             Field::RangePitch => limits.workspace.pitch = angle,
             Field::RangeRoll => limits.workspace.roll = angle,
             Field::RateLimit => {
-                limits.rate =
-                    eel_units::AngularVelocity::from_milliradians_per_second(value as i32);
+                limits.rate = AngularVelocity::from_milliradians_per_second(value as i32);
             }
             _ => return Err(Abort::ReadOnly),
         }
@@ -249,6 +234,10 @@ impl Application for Core {
 
 fn millis(torque: Torque) -> i64 {
     i64::from(torque.to_millinewton_metres())
+}
+
+const fn tenths(temperature: Temperature) -> i32 {
+    temperature.to_decidegrees()
 }
 
 fn torque(value: i64) -> Torque {

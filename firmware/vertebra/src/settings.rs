@@ -4,7 +4,10 @@
 
 use eel_kinematics::{Pose, Wrist};
 use eel_protocol::NodeId;
+use eel_protocol::dictionary::Field;
 use eel_units::{Angle, AngularVelocity, Current, Temperature, Torque, Voltage};
+
+use crate::current::{RESISTANCES, TORQUE_CONSTANTS};
 
 /// Everything that is set for one vertebra.
 #[derive(Clone, Copy, Debug)]
@@ -113,6 +116,20 @@ impl Settings {
             supply_high,
             ..
         } = &self.limits;
+        let Limits {
+            board_hot,
+            motor_hot,
+            rate,
+            damped_torque,
+            ..
+        } = &self.limits;
+        let Motor {
+            torque_constant,
+            resistance,
+            counts_per_turn,
+            ..
+        } = self.motor;
+        let is_in = |value: u32, (least, most): (u32, u32)| (least..=most).contains(&value);
         let positive = [workspace.yaw, workspace.pitch, workspace.roll]
             .into_iter()
             .all(|range| range > Angle::ZERO && range < Angle::FRAC_PI_2);
@@ -122,30 +139,49 @@ impl Settings {
             && supply_low.end < supply_low.start
             && supply_low.start < supply_high.start
             && supply_high.start < supply_high.end
-            && self.motor.torque_constant > 0
-            && self.motor.resistance > 0
-            && self.motor.counts_per_turn > 0
+            && board_hot.start < board_hot.end
+            && motor_hot.start < motor_hot.end
+            && *rate > AngularVelocity::ZERO
+            && *damped_torque >= Torque::ZERO
+            && is_in(torque_constant, TORQUE_CONSTANTS)
+            && is_in(resistance, RESISTANCES)
+            && counts_per_turn > 0
+            && self.motor.current_limit > Current::ZERO
+            && self.motor.speed_limit > AngularVelocity::ZERO
     }
+}
+
+/// Returns the raw number with which a field of the dictionary leaves the factory.
+const fn factory(field: Field) -> i64 {
+    field.sub().default
 }
 
 impl Gains {
     /// The prototype's: stiff enough for half a degree of error at 3.5 N·m.
     pub const PROTOTYPE: Self = Self {
-        stiffness: [400_000, 400_000, 250_000],
-        damping: [6_000, 6_000, 3_000],
+        stiffness: [
+            factory(Field::StiffnessX) as u32,
+            factory(Field::StiffnessY) as u32,
+            factory(Field::StiffnessZ) as u32,
+        ],
+        damping: [
+            factory(Field::DampingX) as u32,
+            factory(Field::DampingY) as u32,
+            factory(Field::DampingZ) as u32,
+        ],
     };
 }
 
 impl Limits {
     /// The prototype's: the workspace of the paper, ±30°, ±15°, ±4°.
     pub const PROTOTYPE: Self = Self {
-        peak_torque: Torque::from_millinewton_metres(3_000),
+        peak_torque: Torque::from_millinewton_metres(factory(Field::PeakTorque) as i32),
         workspace: Pose {
-            yaw: Angle::from_tenth_milliradians(5_236),
-            pitch: Angle::from_tenth_milliradians(2_618),
-            roll: Angle::from_tenth_milliradians(698),
+            yaw: Angle::from_tenth_milliradians(factory(Field::RangeYaw) as i16),
+            pitch: Angle::from_tenth_milliradians(factory(Field::RangePitch) as i16),
+            roll: Angle::from_tenth_milliradians(factory(Field::RangeRoll) as i16),
         },
-        rate: AngularVelocity::from_milliradians_per_second(6_000),
+        rate: AngularVelocity::from_milliradians_per_second(factory(Field::RateLimit) as i32),
         travel: [
             Travel {
                 low: Angle::from_milliradians(-900),
