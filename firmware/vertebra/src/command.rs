@@ -12,6 +12,9 @@ pub const BRIDGED_PERIODS: u8 = 2;
 const BAD_LIMIT: u8 = 3;
 /// Shortest and longest SYNC period that is believed: 200 Hz and 50 Hz, with a tick to spare.
 const PERIOD_RANGE_US: (u32, u32) = (4_000, 21_000);
+/// A SYNC so soon after the segment began is none to follow: a head that sends faster than 200 Hz
+/// must not lead faster than the rate limit.
+const EARLY: Duration = Duration::from_micros(3_500);
 
 /// What has gone wrong with targets since power-up, for object 0x2030.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,6 +36,7 @@ pub struct CommandStream {
     bad_in_a_row: u8,
     missed: u8,
     segment_start: Instant,
+    last_sync: Instant,
     period: Duration,
     fresh: bool,
 }
@@ -62,6 +66,7 @@ impl CommandStream {
             bad_in_a_row: 0,
             missed: 0,
             segment_start: now,
+            last_sync: now,
             period: Duration::from_micros(SYNC_PERIOD_US),
             fresh: false,
         }
@@ -96,13 +101,24 @@ impl CommandStream {
     /// without a target.
     pub fn synchronise(&mut self, now: Instant) -> u8 {
         let (shortest, longest) = PERIOD_RANGE_US;
-        let measured = now.since(self.segment_start).to_micros();
+        let measured = now.since(self.last_sync).to_micros();
+        self.last_sync = now;
         if (shortest..=longest).contains(&measured) {
             // A low pass over eight periods: the tick resolves a SYNC to a millisecond only.
             let smoothed = (self.period.to_micros() * 7 + measured + 4) / 8;
             self.period = Duration::from_micros(smoothed);
         }
         self.begin_segment(now)
+    }
+
+    /// Tells whether a SYNC at `now` would come too soon to begin a segment.
+    pub fn is_early(&self, now: Instant) -> bool {
+        now.since(self.segment_start) < EARLY
+    }
+
+    /// Forgets that a target came, because no segment ends there.
+    pub const fn discard(&mut self) {
+        self.fresh = false;
     }
 
     /// Tells whether a SYNC is overdue by so much that the path must go on without it.

@@ -22,6 +22,8 @@ use crate::workspace::{Limited, admit};
 
 /// Deviation from the reference that is worth a warning: 150 mrad.
 const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
+/// Deviation below which that warning ends: 100 mrad, so that noise doesn't repeat it.
+const FOLLOWING_END: Angle = Angle::from_milliradians(100);
 /// Conditions that a fault reset can't clear because the reset itself, or time, does.
 const CLEARED_BY_RESET: [Condition; 4] = [
     Condition::Latched,
@@ -128,6 +130,7 @@ impl Core {
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
         let drives = self.drive(sample);
+        self.forget_warnings();
         self.report();
         self.end_warnings();
         drives
@@ -195,6 +198,16 @@ impl Core {
         }
     }
 
+    /// Drops the warnings that only mean something while the wrist follows.
+    fn forget_warnings(&mut self) {
+        if self.machine.state() != State::Run {
+            self.note_limited(Limited::default());
+        }
+        if self.reference.is_none() {
+            self.status = self.status.with(Condition::FollowingError, false);
+        }
+    }
+
     /// Tells the bus once that no warning holds any more.
     fn end_warnings(&mut self) {
         let holds = WARNINGS
@@ -209,6 +222,9 @@ impl Core {
     pub fn synchronise(&mut self, now: Instant) {
         self.timing.note_sync(now);
         self.feed_forward = self.received_feed;
+        if self.stream.is_early(now) {
+            return;
+        }
         let missed = self.stream.synchronise(now);
         self.continue_path(missed);
     }
@@ -254,15 +270,17 @@ impl Core {
             Received::Target(target) => target,
             Received::Ignored => return,
             Received::TooManyBad => {
-                let bad = self.stream.counters().bad.min(0xFFFF);
-                self.stop(Emergency::COMMAND_BAD, bad);
-                self.status = self.status.with(Condition::CommandLost, true);
+                self.lose_command(Emergency::COMMAND_BAD, self.stream.counters().bad);
                 return;
             }
         };
         self.command(target.mode);
         if self.machine.state() != State::Run {
             self.note_limited(Limited::default());
+            return;
+        }
+        if self.stream.is_early(self.now) {
+            self.stream.discard();
             return;
         }
         let wanted = Pose {
@@ -341,7 +359,7 @@ impl Core {
             State::Damped => Some(self.settings.limits.damped_torque),
             State::StopDamped => Some(self.stop_cap()),
             State::Brake | State::StopBrake => return [Drive::Brake; 3],
-            State::Fault => return self.fault_drives(sample),
+            State::Fault => return self.fault_drives(),
             State::NotReady | State::SwitchedOff | State::Ready | State::StopOff => {
                 return [Drive::Off; 3];
             }
@@ -365,8 +383,14 @@ impl Core {
         let (moment, error) = self
             .impedance
             .moment(motion, &reference, &self.feed_forward);
-        let far = error.iter().any(|axis| axis.abs() > FOLLOWING_LIMIT);
-        if far && !self.status.contains(Condition::FollowingError) {
+        let was_far = self.status.contains(Condition::FollowingError);
+        let limit = if was_far {
+            FOLLOWING_END
+        } else {
+            FOLLOWING_LIMIT
+        };
+        let far = error.iter().any(|axis| axis.abs() > limit);
+        if far && !was_far {
             let worst = error
                 .iter()
                 .map(|axis| axis.abs())

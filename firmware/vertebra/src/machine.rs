@@ -20,6 +20,7 @@ pub struct Machine {
     armed: bool,
     last_mode: Option<Mode>,
     faulty_motor: Option<usize>,
+    free: bool,
 }
 
 /// What a change of mode came to.
@@ -42,6 +43,7 @@ impl Machine {
             armed: false,
             last_mode: None,
             faulty_motor: None,
+            free: false,
         }
     }
 
@@ -58,6 +60,16 @@ impl Machine {
     /// Returns the motor (0–2) that is at fault, if it is one motor.
     pub const fn faulty_motor(&self) -> Option<usize> {
         self.faulty_motor
+    }
+
+    /// Tells whether a fault finds, or an emergency stop has left, all bridges off.
+    pub const fn is_free(&self) -> bool {
+        self.free
+    }
+
+    /// Tells whether a stop is still slowing the wrist down.
+    pub const fn is_stopping(&self) -> bool {
+        matches!(self.state, State::StopDamped | State::StopBrake)
     }
 
     /// Tells whether the bridges are, or may be, driven.
@@ -131,6 +143,7 @@ impl Machine {
 
     /// Switches off at once and latches. Tells whether that is new.
     pub fn emergency_stop(&mut self, now: Instant) -> bool {
+        self.free = true;
         let new = !matches!(self.state, State::StopOff | State::Fault);
         if new {
             self.enter(now, State::StopOff);
@@ -143,6 +156,7 @@ impl Machine {
         let new = self.state != State::Fault;
         if new {
             self.faulty_motor = motor;
+            self.free = !self.is_enabled() && !self.is_stopping();
             self.enter(now, State::Fault);
         }
         new

@@ -27,8 +27,7 @@ impl Core {
             self.emergency_stop(Emergency::EMERGENCY_STOP);
         }
         if self.machine.is_enabled() && self.stream.is_lost(self.now) {
-            self.stop(Emergency::COMMAND_LOST, TARGET_TIMEOUT.to_micros() / 1_000);
-            self.status = self.status.with(Condition::CommandLost, true);
+            self.lose_command(Emergency::COMMAND_LOST, TARGET_TIMEOUT.to_micros() / 1_000);
         }
         self.status = self
             .status
@@ -180,6 +179,14 @@ impl Core {
         self.note_state(before);
     }
 
+    /// Lets go because there are no targets to follow; nothing is lost where none was followed.
+    pub fn lose_command(&mut self, emergency: Emergency, detail: u32) {
+        if self.machine.is_enabled() {
+            self.stop(emergency, detail);
+            self.status = self.status.with(Condition::CommandLost, true);
+        }
+    }
+
     /// Switches off at once, with the reason.
     pub fn emergency_stop(&mut self, emergency: Emergency) {
         let before = self.machine.state();
@@ -189,11 +196,11 @@ impl Core {
         self.note_state(before);
     }
 
-    /// Stops by NMT: in order when enabled, and latched in any case.
+    /// Stops by NMT: in order when enabled, and latched in any case. A stop that has begun goes on.
     pub fn latch_stop(&mut self) {
         if self.machine.is_enabled() {
             self.stop(Emergency::STOPPED_BY_NMT, 0);
-        } else {
+        } else if !self.machine.state().is_latched() {
             self.emergency_stop(Emergency::STOPPED_BY_NMT);
         }
     }
@@ -220,8 +227,9 @@ impl Core {
     }
 
     /// Returns the drives of a fault: the motor at fault is off, the others brake, then all off.
-    pub fn fault_drives(&self, sample: &Sample) -> [Drive; 3] {
-        if sample.emergency_stop || self.machine.elapsed(self.now) >= STOP_BRAKE {
+    /// What was off before the fault stays off.
+    pub fn fault_drives(&self) -> [Drive; 3] {
+        if self.machine.is_free() || self.machine.elapsed(self.now) >= STOP_BRAKE {
             return [Drive::Off; 3];
         }
         let mut drives = [Drive::Brake; 3];

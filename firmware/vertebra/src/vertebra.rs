@@ -17,6 +17,8 @@ use crate::settings::Settings;
 pub struct Vertebra {
     node: Node,
     core: Core,
+    /// What NMT "reset node" goes back to.
+    settings: Settings,
 }
 
 /// Does one turn: all frames in their order, the sample, then everything that is to be sent.
@@ -45,6 +47,7 @@ impl Vertebra {
         Self {
             node,
             core: Core::new(settings, now),
+            settings,
         }
     }
 
@@ -136,7 +139,10 @@ impl Vertebra {
                 eel_canopen::Event::Nmt { command, state } => self.follow_nmt(now, command, state),
                 eel_canopen::Event::Sync { .. } => self.core.synchronise(now),
                 eel_canopen::Event::HeartbeatLost(_) => self.core.lose_head(),
-                eel_canopen::Event::HeartbeatBack(_) => self.core.hear_head(),
+                // A consumer that was reset meanwhile only tells that it heard something.
+                eel_canopen::Event::HeartbeatBack(_) | eel_canopen::Event::RemoteState { .. } => {
+                    self.core.hear_head();
+                }
                 _ => {}
             }
         }
@@ -144,8 +150,7 @@ impl Vertebra {
 
     fn follow_nmt(&mut self, now: Instant, command: NmtCommand, state: NmtState) {
         if command == NmtCommand::ResetNode {
-            let settings = self.core.settings;
-            self.core = Core::new(settings, now);
+            self.core = Core::new(self.settings, now);
             self.core.events.push(Event::Reset);
         }
         self.core.operational = state == NmtState::Operational;
