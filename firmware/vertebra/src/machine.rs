@@ -1,8 +1,8 @@
 //! The states of a vertebra and what leads from one to the next.
 //!
 //! A stop is latched: a stream of targets that resumes moves nothing, only a fault reset, then an
-//! "off", then a new "run" does. Powering up counts as a stop: the first "run" needs an "off"
-//! before it.
+//! "off", then a new "run" does. Powering up counts as a stop, and so does a "run" that was
+//! refused: the next one needs an "off" before it.
 
 use eel_protocol::{Mode, State};
 use eel_units::{Duration, Instant};
@@ -113,6 +113,8 @@ impl Machine {
             self.enter(now, wanted);
             Outcome::Done
         } else {
+            // Asked too early: the same stream must not enable once the reason is gone.
+            self.armed = false;
             Outcome::Refused
         }
     }

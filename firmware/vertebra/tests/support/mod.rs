@@ -307,6 +307,50 @@ impl Bench {
     }
 }
 
+/// Lets a good stream ask for every mode and checks that nothing moves.
+pub fn stays_off(bench: &mut Bench) {
+    bench.heartbeat = true;
+    (bench.stream, bench.sync) = (true, true);
+    (bench.damage, bench.counts) = (0, true);
+    for mode in [
+        Mode::Run,
+        Mode::Hold,
+        Mode::Damped,
+        Mode::Brake,
+        Mode::Off,
+        Mode::Run,
+    ] {
+        bench.mode = mode;
+        for _ in 0..60 {
+            bench.tick();
+            assert!(
+                bench.is_off(),
+                "{mode:?} moves a stopped vertebra: {:?}",
+                bench.drives
+            );
+            assert!(bench.state().is_latched() && bench.holds(Condition::Latched));
+        }
+    }
+}
+
+/// Runs a vertebra and takes its targets away until it stands in this part of its stop.
+pub fn stopping(state: State) -> Bench {
+    let mut bench = Bench::running();
+    bench.stream = false;
+    bench.until(state, 3_000);
+    bench.stream = true;
+    bench
+}
+
+/// Runs a vertebra and lets the bridge of motor 2 report a fault for one tick.
+pub fn faulty() -> Bench {
+    let mut bench = Bench::running();
+    bench.sample.bridge_fault[1] = true;
+    bench.tick();
+    bench.sample.bridge_fault[1] = false;
+    bench
+}
+
 /// Returns the counter of a crank: 88 064 counts a turn, from some number at zero.
 pub fn counts(angle: Angle) -> i32 {
     12_345 + (radians(angle) / core::f64::consts::TAU * 88_064.0).round() as i32
