@@ -229,10 +229,10 @@ fn a_bridge_fault_or_an_emergency_stop_before_enabling_latches() {
     type Set = fn(&mut Bench, bool);
     let causes: [(Condition, Set); 2] = [
         (Condition::Bridge, |bench, on| {
-            bench.sample.bridge_fault[1] = on
+            bench.sample.bridge_fault[1] = on;
         }),
         (Condition::EmergencyStop, |bench, on| {
-            bench.sample.emergency_stop = on
+            bench.sample.emergency_stop = on;
         }),
     ];
     for (condition, set) in causes {
