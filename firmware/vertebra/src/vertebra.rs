@@ -116,6 +116,12 @@ impl Vertebra {
         self.core.angles()
     }
 
+    /// Returns how many targets since power-up never arrived or could not be believed.
+    pub fn targets_lost(&self) -> u32 {
+        let counters = self.core.stream.counters();
+        counters.lost.saturating_add(counters.bad)
+    }
+
     /// Returns the state of the node on the bus.
     pub fn nmt_state(&self) -> NmtState {
         self.node.nmt_state()

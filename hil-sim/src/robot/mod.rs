@@ -17,6 +17,7 @@ use eel_vertebra::{Drive, Sample};
 
 use crate::bus::{
     BitRate, Bus, ControllerConfig, Event as BusEvent, Fifo, Filter, FilterMatch, Statistics,
+    TransmitMode,
 };
 use crate::plant::{Config as PlantConfig, Plant};
 
@@ -181,10 +182,16 @@ impl Robot {
         self.bus.load()
     }
 
-    /// Returns how many frames were lost anywhere: in full receive FIFOs and full queues.
+    /// Returns how many frames were lost anywhere: in full receive FIFOs and full queues, and those
+    /// that a counter or a protection byte shows to have been lost on the way.
     pub fn frames_lost(&self) -> u64 {
         let links = self.nodes.iter().map(|seat| &seat.link).chain([&self.head_link]);
-        links.map(|link| link.lost(&self.bus)).sum::<u64>() + u64::from(self.head.dropped())
+        let queues: u64 = links.map(|link| link.lost(&self.bus)).sum();
+        let reports = NodeId::all().filter_map(|id| self.head.node(id));
+        let reports = reports.map(|node| u64::from(node.lost_reports) + u64::from(node.bad_reports));
+        let targets = self.nodes.iter().filter_map(|seat| seat.node.vertebra());
+        let targets = targets.map(|vertebra| u64::from(vertebra.targets_lost()));
+        queues + reports.sum::<u64>() + targets.sum::<u64>() + u64::from(self.head.dropped())
     }
 
     /// Lets frames end up to `to_ns`; after each, the controllers are served as by interrupt.
@@ -274,11 +281,7 @@ fn head_controller() -> ControllerConfig {
         matches: FilterMatch::Range(u32::from(cob.id()) + 1, u32::from(cob.id()) + 0x7F),
         store: Some(Fifo::Zero),
     };
-    ControllerConfig {
-        filters: vec![every(Cob::Emergency(0)), every(Cob::Pose(0)), every(Cob::Heartbeat(0))],
-        otherwise: None,
-        ..ControllerConfig::default()
-    }
+    hearing(vec![every(Cob::Emergency(0)), every(Cob::Pose(0)), every(Cob::Heartbeat(0))])
 }
 
 /// A vertebra listens to what is for it, as the board's acceptance filters do.
@@ -290,13 +293,21 @@ fn vertebra_controller(id: NodeId) -> ControllerConfig {
         matches: FilterMatch::Dual(one(a), one(b)),
         store: Some(Fifo::Zero),
     };
+    hearing(vec![
+        dual(Cob::Nmt, Cob::Sync),
+        dual(Cob::Target(node), Cob::Moment(node)),
+        dual(Cob::SdoRequest(node), Cob::Heartbeat(HEAD_NODE)),
+    ])
+}
+
+/// A controller that hears what the filters fit and sends in the order of its program. In queue mode
+/// the FDCAN lets frames with one identifier overtake each other, as a new one takes the lowest free
+/// buffer: segments of an SDO transfer and emergencies would arrive in a wrong order.
+fn hearing(filters: Vec<Filter>) -> ControllerConfig {
     ControllerConfig {
-        filters: vec![
-            dual(Cob::Nmt, Cob::Sync),
-            dual(Cob::Target(node), Cob::Moment(node)),
-            dual(Cob::SdoRequest(node), Cob::Heartbeat(HEAD_NODE)),
-        ],
+        filters,
         otherwise: None,
+        transmit_mode: TransmitMode::Fifo,
         ..ControllerConfig::default()
     }
 }

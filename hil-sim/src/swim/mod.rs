@@ -221,10 +221,6 @@ impl Watcher {
         let files = self.records.finish(&drawing)?;
         let nodes: Vec<NodeSummary> = (0..NODES).map(|index| self.tracking.node(index)).collect();
         let statistics = robot.bus_statistics();
-        let head_losses: u64 = NodeId::all()
-            .filter_map(|id| robot.head().node(id))
-            .map(|status| u64::from(status.lost_reports) + u64::from(status.bad_reports))
-            .sum();
         let simulated_s = robot.now_ns() as f64 / 1e9;
         let summary = Summary {
             seconds: options.seconds,
@@ -241,7 +237,7 @@ impl Watcher {
             emergencies: self.emergencies,
             boots: self.boots,
             frames: statistics.frames,
-            frames_lost: robot.frames_lost() + head_losses,
+            frames_lost: robot.frames_lost(),
             bus_load_percent: robot.bus_load() * 100.0,
             real_time_factor: simulated_s / started.elapsed().as_secs_f64().max(1e-9),
             frame_log_sha256: files.frame_log_sha256,
