@@ -10,8 +10,9 @@ const FRAMES: u64 = 3_000_000;
 
 fn main() {
     let mut bus = Bus::new(BitRate::ONE_MEGABIT);
-    let ids: Vec<_> =
-        (0..11).filter_map(|_| bus.attach(ControllerConfig::default()).ok()).collect();
+    let ids: Vec<_> = (0..11)
+        .filter_map(|_| bus.attach(ControllerConfig::default()).ok())
+        .collect();
     let start = Instant::now();
     let (mut confirmed, mut read, mut number, mut now_ns) = (0u64, 0u64, 0u64, 0);
     while confirmed < FRAMES {
@@ -20,8 +21,9 @@ fn main() {
                 let data = number.wrapping_mul(0x9E37_79B9_7F4A_7C15).to_be_bytes();
                 let cob_id = (number as u16 & 0x3F) << 4 | at as u16;
                 let frame = Frame::standard(cob_id, &data);
-                match frame.map_or(Err(EnqueueError::Off), |frame| bus.enqueue(now_ns, *id, frame))
-                {
+                match frame.map_or(Err(EnqueueError::Off), |frame| {
+                    bus.enqueue(now_ns, *id, frame)
+                }) {
                     Ok(()) => number += 1,
                     Err(_) => break,
                 }

@@ -33,23 +33,52 @@ pub struct Row {
 /// Runs every check of the plant.
 pub fn run() -> Report {
     let checks: Vec<Row> = all().into_iter().map(Row::from).collect();
-    Report { passed: checks.iter().all(|row| row.passed), checks }
+    Report {
+        passed: checks.iter().all(|row| row.passed),
+        checks,
+    }
 }
 
 impl From<Check> for Row {
     fn from(check: Check) -> Self {
-        let Check { name, figure, bound, unit, passed } = check;
-        Self { name, figure, bound, unit, passed }
+        let Check {
+            name,
+            figure,
+            bound,
+            unit,
+            passed,
+        } = check;
+        Self {
+            name,
+            figure,
+            bound,
+            unit,
+            passed,
+        }
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.checks.iter().map(|row| row.name.len()).max().unwrap_or(0);
+        let width = self
+            .checks
+            .iter()
+            .map(|row| row.name.len())
+            .max()
+            .unwrap_or(0);
         for row in &self.checks {
             let verdict = if row.passed { "pass" } else { "FAIL" };
-            let Row { name, figure, bound, unit, .. } = row;
-            writeln!(out, "{verdict}  {name:width$}  {figure:10.3e} ≤ {bound:.1e} {unit}")?;
+            let Row {
+                name,
+                figure,
+                bound,
+                unit,
+                ..
+            } = row;
+            writeln!(
+                out,
+                "{verdict}  {name:width$}  {figure:10.3e} ≤ {bound:.1e} {unit}"
+            )?;
         }
         Ok(())
     }

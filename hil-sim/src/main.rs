@@ -1,21 +1,54 @@
 //! `hil-sim`: ten vertebrae swim in simulated water.
 
+mod interrupt;
+mod live;
+
+use std::io::{ErrorKind, Write, stdout};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use eel_head::{Gait, GaitError, Plane};
+use eel_protocol::{NodeId, VERTEBRAE};
 use hil_sim::{checks, swim};
 
 /// Simulates the eel: ten vertebrae with their real firmware logic, the CAN bus, the water.
 #[derive(Parser)]
 #[command(name = "hil-sim", version, about, long_about = None)]
-#[command(after_help = "Without a command it swims with the defaults.\n\
-    Exit codes: 0 fine, 1 a check failed or vertebrae did not follow, 2 wrong usage or files.")]
+#[command(args_conflicts_with_subcommands = true)]
+#[command(
+    after_help = "Without a command and options it swims with the defaults of `swim`.\n\
+    Exit codes: 0 fine, 1 a check failed, vertebrae did not follow, frames were lost or Ctrl-C came, \
+    2 wrong usage, files or interface."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    live: LiveArgs,
 }
+
+#[derive(Args)]
+struct LiveArgs {
+    /// Run the vertebrae in real time on a SocketCAN interface instead, for other programs to talk
+    /// to, until Ctrl-C; `cargo xtask vcan -- COMMAND` runs a command beside a vcan0
+    #[arg(long, value_name = "IFACE")]
+    can: Option<String>,
+    /// With --can: which vertebrae, by node id, as 3,5 or 1-4,9; all ten without it
+    #[arg(long, requires = "can", value_name = "IDS", value_parser = node_ids)]
+    nodes: Option<NodeList>,
+    /// With --can: time until the end, s [0.1 to 1e6]
+    #[arg(long, requires = "can", value_parser = between(0.1, 1e6))]
+    seconds: Option<f64>,
+    /// With --can: seed of encoder positions and sensor noise [default: 1]
+    #[arg(long, requires = "can")]
+    seed: Option<u64>,
+}
+
+/// Vertebrae in the order of their node ids.
+#[derive(Clone)]
+struct NodeList(Vec<NodeId>);
 
 #[derive(Subcommand)]
 enum Command {
@@ -67,16 +100,43 @@ fn between(low: f64, high: f64) -> impl Fn(&str) -> Result<f64, String> + Clone 
     }
 }
 
+/// Reads node ids and ranges of them, separated by commas.
+fn node_ids(text: &str) -> Result<NodeList, String> {
+    let wrong = || format!("give node ids from 1 to {VERTEBRAE}, as 3,5 or 1-4,9");
+    let one = |text: &str| {
+        text.trim()
+            .parse()
+            .ok()
+            .and_then(NodeId::new)
+            .ok_or_else(wrong)
+    };
+    let mut chosen = Vec::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let (first, last) = (one(first)?, one(last)?);
+        if first > last {
+            return Err(wrong());
+        }
+        chosen.extend(NodeId::all().filter(|id| (first..=last).contains(id)));
+    }
+    chosen.sort();
+    chosen.dedup();
+    Ok(NodeList(chosen))
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = match &cli.command {
-        None => run_swim(&SwimArgs::defaults()),
-        Some(Command::Swim(args)) => run_swim(args),
-        Some(Command::Check(args)) => run_checks(args),
+    let result = match (&cli.command, &cli.live.can) {
+        (Some(Command::Swim(args)), _) => run_swim(args),
+        (Some(Command::Check(args)), _) => run_checks(args),
+        (None, Some(interface)) => run_live(interface, &cli.live),
+        (None, None) => run_swim(&SwimArgs::defaults()),
     };
     match result {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
+        // Whoever read the output has seen enough of it.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("hil-sim: {error:#}");
             ExitCode::from(2)
@@ -107,13 +167,47 @@ fn run_swim(args: &SwimArgs) -> anyhow::Result<bool> {
         faults: Vec::new(),
         progress: !args.json,
     };
-    let summary = swim::run(&options)?;
+    interrupt::listen()?;
+    let summary = swim::run_while(&options, || !interrupt::came())?;
     if args.json {
-        println!("{}", serde_json::to_string(&summary)?);
+        write(format_args!("{}\n", serde_json::to_string(&summary)?))?;
     } else {
-        print!("{summary}");
+        write(format_args!("{summary}"))?;
     }
-    Ok(summary.nodes_operational == hil_sim::robot::NODES && summary.frames_lost == 0)
+    let complaints = summary.complaints();
+    for complaint in &complaints {
+        eprintln!("hil-sim: {complaint}");
+    }
+    Ok(complaints.is_empty())
+}
+
+/// Runs vertebrae on an interface and tells whether the bus took all that they sent.
+fn run_live(interface: &str, args: &LiveArgs) -> anyhow::Result<bool> {
+    let nodes = args
+        .nodes
+        .clone()
+        .unwrap_or_else(|| NodeList(NodeId::all().collect()));
+    let (seconds, seed) = (args.seconds, args.seed.unwrap_or(1));
+    interrupt::listen()?;
+    live::run(&live::Live {
+        interface,
+        nodes: &nodes.0,
+        seconds,
+        seed,
+    })
+}
+
+/// Writes to standard output.
+fn write(text: std::fmt::Arguments<'_>) -> anyhow::Result<()> {
+    let mut out = stdout().lock();
+    out.write_fmt(text)
+        .and_then(|()| out.flush())
+        .context("can't write the result")
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    let io = error.downcast_ref::<std::io::Error>();
+    io.is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
 }
 
 /// Brings the options into the head's units: mHz and ten-thousandths of a body length.
@@ -135,9 +229,9 @@ fn gait(args: &SwimArgs) -> anyhow::Result<Gait> {
 fn run_checks(args: &CheckArgs) -> anyhow::Result<bool> {
     let report = checks::run();
     if args.json {
-        println!("{}", serde_json::to_string(&report)?);
+        write(format_args!("{}\n", serde_json::to_string(&report)?))?;
     } else {
-        print!("{report}");
+        write(format_args!("{report}"))?;
     }
     Ok(report.passed)
 }

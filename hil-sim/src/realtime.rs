@@ -1,8 +1,8 @@
-//! Ten vertebrae in real time on a bus of the host, so that other programs can talk to them.
+//! Vertebrae in real time on a bus of the host, so that other programs can talk to them.
 //!
 //! The firmware's own logic and the plant run as in [`crate::robot`], but the bus is one that
-//! others share: a SocketCAN interface, or any [`Bus`]. All ten nodes use one socket; what one of
-//! them sends the other nine hear in its next tick. The head is not in here: it is whoever is on the
+//! others share: a SocketCAN interface, or any [`Bus`]. All nodes use one socket; what one of them
+//! sends the others hear in their next tick. The head is not in here: it is whoever is on the
 //! bus. There is no arbitration, no frame time and no receive FIFO: those of the host's bus hold.
 //!
 //! Time for the nodes is the number of ticks, so what they do depends on what they receive and in
@@ -44,11 +44,11 @@ pub struct Counters {
     pub dropped: u64,
 }
 
-/// Ten vertebrae and their plant on one bus.
+/// Vertebrae and their plant on one bus.
 pub struct Realtime<B> {
     bus: B,
     plant: Plant,
-    nodes: Vec<NativeNode>,
+    nodes: Vec<(NodeId, NativeNode)>,
     drives: [[Drive; 3]; NODES],
     /// What the nodes sent in their last tick, and which of them.
     local: Vec<(usize, Frame)>,
@@ -60,10 +60,18 @@ pub struct Realtime<B> {
 impl<B: Bus> Realtime<B> {
     /// Powers ten prototypes up in still water; the seed sets encoder positions and sensor noise.
     pub fn new(bus: B, plant: &PlantConfig, seed: u64) -> Self {
+        let all: Vec<NodeId> = NodeId::all().collect();
+        Self::with_nodes(bus, plant, seed, &all)
+    }
+
+    /// Powers some of the prototypes up. The whole eel is in the water; motors of vertebrae that are
+    /// not here, but perhaps elsewhere on the bus, are off.
+    pub fn with_nodes(bus: B, plant: &PlantConfig, seed: u64, nodes: &[NodeId]) -> Self {
+        let powered = NodeId::all().filter(|id| nodes.contains(id));
         Self {
             bus,
             plant: Plant::new(plant, seed),
-            nodes: NodeId::all().map(NativeNode::new).collect(),
+            nodes: powered.map(|id| (id, NativeNode::new(id))).collect(),
             drives: [[Drive::Off; 3]; NODES],
             local: Vec::new(),
             incoming: Vec::new(),
@@ -72,15 +80,18 @@ impl<B: Bus> Realtime<B> {
         }
     }
 
-    /// Runs a tick a millisecond of the host's clock for as long as `keep_going` agrees, which is
-    /// asked about every millisecond.
+    /// Runs a tick a millisecond of the host's clock for as long as `keep_going` agrees, which sees
+    /// the counters about every millisecond.
     ///
     /// # Errors
     /// What the bus fails with.
-    pub fn run(&mut self, mut keep_going: impl FnMut() -> bool) -> Result<Counters, BusError> {
+    pub fn run(
+        &mut self,
+        mut keep_going: impl FnMut(&Counters) -> bool,
+    ) -> Result<Counters, BusError> {
         let start = HostInstant::now();
         let mut pace = Pace::default();
-        while keep_going() {
+        while keep_going(&self.counters) {
             for _ in 0..pace.due(start.elapsed()) {
                 self.tick()?;
             }
@@ -101,7 +112,8 @@ impl<B: Bus> Realtime<B> {
         self.receive()?;
         let now = Instant::from_micros(self.counters.ticks * TICK_NS / 1_000);
         let (heard, mut frames, mut sent) = (std::mem::take(&mut self.local), vec![], vec![]);
-        for (index, node) in self.nodes.iter_mut().enumerate() {
+        for (id, node) in &mut self.nodes {
+            let index = id.index();
             frames.clear();
             let others = heard.iter().filter(|(sender, _)| *sender != index);
             frames.extend(others.map(|(_, frame)| *frame));
@@ -123,9 +135,12 @@ impl<B: Bus> Realtime<B> {
         &self.plant
     }
 
-    /// Returns a vertebra.
-    pub fn node(&self, id: NodeId) -> &NativeNode {
-        &self.nodes[id.index()]
+    /// Returns a vertebra, where it is one of these.
+    pub fn node(&self, id: NodeId) -> Option<&NativeNode> {
+        self.nodes
+            .iter()
+            .find(|(other, _)| *other == id)
+            .map(|(_, node)| node)
     }
 
     /// Returns what happened so far.

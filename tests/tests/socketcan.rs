@@ -7,6 +7,12 @@
 #[path = "socketcan/can_utils.rs"]
 mod can_utils;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/chosen_nodes.rs"]
+mod chosen_nodes;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/nodes.rs"]
+mod nodes;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/support.rs"]
 mod support;
 #[cfg(target_os = "linux")]

@@ -116,10 +116,10 @@ impl Vertebra {
         self.core.angles()
     }
 
-    /// Returns how many targets since power-up never arrived or could not be believed.
+    /// Returns how many targets since power-up the counter shows to have been lost on the way: never
+    /// arrived, or arrived and not believed.
     pub fn targets_lost(&self) -> u32 {
-        let counters = self.core.stream.counters();
-        counters.lost.saturating_add(counters.bad)
+        self.core.stream.counters().lost
     }
 
     /// Returns the state of the node on the bus.

@@ -65,6 +65,24 @@ fn all_ten_boot_beat_and_tell_their_device_type() {
 }
 
 #[test]
+fn only_the_chosen_vertebrae_are_there_and_the_motors_of_the_others_are_off() {
+    let (ours, mut bus) = pair();
+    let chosen = [5, 3].map(|id| NodeId::new(id).unwrap());
+    let mut nodes = Realtime::with_nodes(ours, &PlantConfig::default(), 1, &chosen);
+    let seen = ticks(&mut nodes, &mut bus, 500);
+    let from: Vec<u16> = seen.iter().filter_map(Frame::cob_id).take(2).collect();
+    assert_eq!(from, [Cob::Heartbeat(3).id(), Cob::Heartbeat(5).id()]);
+    assert!(
+        seen.iter()
+            .all(|frame| from.contains(&frame.cob_id().unwrap()))
+    );
+    for id in NodeId::all() {
+        assert_eq!(nodes.node(id).is_some(), chosen.contains(&id), "{id:?}");
+        assert!(chosen.contains(&id) || nodes.drives[id.index()] == [Drive::Off; 3]);
+    }
+}
+
+#[test]
 fn started_nodes_report_their_pose_at_every_sync() {
     let (mut nodes, mut bus) = ten_nodes();
     ticks(&mut nodes, &mut bus, 10);
@@ -105,5 +123,5 @@ fn equal_frames_in_equal_ticks_give_equal_answers() {
 fn a_bus_that_ends_ends_the_run() {
     let (mut nodes, bus) = ten_nodes();
     drop(bus);
-    assert!(matches!(nodes.run(|| true), Err(BusError::Ended)));
+    assert!(matches!(nodes.run(|_| true), Err(BusError::Ended)));
 }

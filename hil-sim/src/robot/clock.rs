@@ -35,7 +35,11 @@ impl Schedule {
         }
         // The sort is stable: at one instant the plant comes before the head.
         period.sort_by_key(|(at_ns, _)| *at_ns);
-        Self { period, at: 0, start_ns: 0 }
+        Self {
+            period,
+            at: 0,
+            start_ns: 0,
+        }
     }
 
     /// Returns when the next happening is due.

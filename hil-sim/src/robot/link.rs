@@ -82,7 +82,7 @@ impl Link {
     pub fn lost(&self, bus: &Bus) -> u64 {
         let hardware = bus
             .controller(self.controller)
-            .map_or(0, |counters| counters.overruns.iter().map(|count| *count).sum());
+            .map_or(0, |counters| counters.overruns.iter().sum());
         hardware + self.overruns + self.dropped
     }
 }

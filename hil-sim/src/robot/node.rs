@@ -60,7 +60,10 @@ impl NativeNode {
 
     /// Powers a vertebra with these settings up.
     pub fn with_settings(settings: Settings) -> Self {
-        Self { settings, vertebra: Vertebra::new(settings, Instant::ZERO) }
+        Self {
+            settings,
+            vertebra: Vertebra::new(settings, Instant::ZERO),
+        }
     }
 }
 
@@ -78,7 +81,9 @@ impl Node for NativeNode {
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3] {
         let frames = frames.iter().copied();
-        turn(&mut self.vertebra, now, frames, sample, |frame| sent.push(frame))
+        turn(&mut self.vertebra, now, frames, sample, |frame| {
+            sent.push(frame);
+        })
     }
 
     fn reset(&mut self, now: Instant) {

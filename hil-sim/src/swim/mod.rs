@@ -18,7 +18,7 @@ use crate::bus::Event as BusEvent;
 use crate::picture;
 use crate::plant::Plant;
 use crate::plant::measures::{Moment, Recording, Stroke, swim_figures};
-use crate::robot::{Config, Fault, NODES, Node, Observer, Robot, TICK_NS, Turn};
+use crate::robot::{Config, Fault, NODES, Node, Observer, Robot, Turn};
 
 pub use record::Records;
 pub use summary::{NodeSummary, Summary};
@@ -61,6 +61,18 @@ pub struct Options {
 /// # Errors
 /// Records that can't be written; the text names the file.
 pub fn run(options: &Options) -> anyhow::Result<Summary> {
+    run_while(options, || true)
+}
+
+/// Swims for as long as `keep_going` agrees, which is asked every 10 ms of simulated time; then the
+/// stop begins early, and the records hold what happened until then.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_while(
+    options: &Options,
+    mut keep_going: impl FnMut() -> bool,
+) -> anyhow::Result<Summary> {
     let started = WallClock::now();
     let config = Config {
         faults: options.faults.clone(),
@@ -70,12 +82,16 @@ pub fn run(options: &Options) -> anyhow::Result<Summary> {
     let mut watcher = Watcher::new(options)?;
     let end_ns = (options.seconds * 1e9) as u64;
     let bar = progress_bar(options);
-    advance(&mut robot, &mut watcher, end_ns, &bar, started)?;
+    while robot.now_ns() < end_ns && keep_going() {
+        let to_ns = (robot.now_ns() + ROW_NS).min(end_ns);
+        advance(&mut robot, &mut watcher, to_ns, &bar, started)?;
+    }
+    watcher.swim_end_ns = robot.now_ns();
     let operational = watcher.operational(&robot);
     robot.stop();
-    let limit_ns = end_ns + STOP_LIMIT_NS;
+    let limit_ns = robot.now_ns() + STOP_LIMIT_NS;
     while robot.head().phase() != Phase::Stopped && robot.now_ns() < limit_ns {
-        let to_ns = robot.now_ns() + TICK_NS * 10;
+        let to_ns = robot.now_ns() + ROW_NS;
         advance(&mut robot, &mut watcher, to_ns, &bar, started)?;
     }
     bar.finish_and_clear();
@@ -83,27 +99,24 @@ pub fn run(options: &Options) -> anyhow::Result<Summary> {
     Ok(summary)
 }
 
-/// Runs up to `end_ns`, row by row.
+/// Runs up to `to_ns`, at most a row of the state record.
 fn advance(
     robot: &mut Robot,
     watcher: &mut Watcher,
-    end_ns: u64,
+    to_ns: u64,
     bar: &ProgressBar,
     started: WallClock,
 ) -> anyhow::Result<()> {
-    while robot.now_ns() < end_ns {
-        let to_ns = (robot.now_ns() + ROW_NS).min(end_ns);
-        robot.run(to_ns, watcher);
-        watcher.row(robot)?;
-        if robot.now_ns().is_multiple_of(SHOWN_NS) {
-            let simulated = robot.now_ns() as f64 / 1e9;
-            bar.set_position(robot.now_ns() / 1_000_000);
-            bar.set_message(format!(
-                "{simulated:5.1} s  {:4.0}x real time  bus {:4.1} %",
-                simulated / started.elapsed().as_secs_f64().max(1e-9),
-                robot.bus_load() * 100.0,
-            ));
-        }
+    robot.run(to_ns, watcher);
+    watcher.row(robot)?;
+    if robot.now_ns().is_multiple_of(SHOWN_NS) {
+        let simulated = robot.now_ns() as f64 / 1e9;
+        bar.set_position(robot.now_ns() / 1_000_000);
+        bar.set_message(format!(
+            "{simulated:5.1} s  {:4.0}x real time  bus {:4.1} %",
+            simulated / started.elapsed().as_secs_f64().max(1e-9),
+            robot.bus_load() * 100.0,
+        ));
     }
     Ok(())
 }
@@ -135,13 +148,17 @@ impl Watcher {
     fn new(options: &Options) -> anyhow::Result<Self> {
         let records = match &options.out {
             Some(folder) => Records::create(folder)
-                .with_context(|| format!("can't write records to {}", folder.display()))?,
+                .with_context(|| format!("can't write to {}", folder.display()))
+                .context("no records; --out names another folder")?,
             None => Records::nowhere(),
         };
         Ok(Self {
             records,
             tracking: Tracking::new(),
-            recording: Recording { interval_s: ROW_NS as f64 / 1e9, moments: Vec::new() },
+            recording: Recording {
+                interval_s: ROW_NS as f64 / 1e9,
+                moments: Vec::new(),
+            },
             snapshots: Vec::new(),
             swim_end_ns: (options.seconds * 1e9) as u64,
             next_row_ns: ROW_NS,
@@ -218,12 +235,15 @@ impl Watcher {
             ),
         };
         let drawing = picture::stride_svg(&self.snapshots, &robot.plant().config().shape, &caption);
-        let files = self.records.finish(&drawing)?;
+        let interrupted = self.swim_end_ns < (options.seconds * 1e9) as u64;
+        // The pictures are of the last stride that was planned.
+        let files = self.records.finish((!interrupted).then_some(&drawing))?;
         let nodes: Vec<NodeSummary> = (0..NODES).map(|index| self.tracking.node(index)).collect();
         let statistics = robot.bus_statistics();
         let simulated_s = robot.now_ns() as f64 / 1e9;
         let summary = Summary {
-            seconds: options.seconds,
+            seconds: self.swim_end_ns as f64 / 1e9,
+            interrupted,
             simulated_s,
             frequency_hz: options.frequency_hz,
             amplitude_body_lengths: options.amplitude,
@@ -264,7 +284,8 @@ impl Observer for Watcher {
         let index = id.index();
         self.tracking.note_torque(index, plant.motor_torque(index));
         if let Some(reference) = node.vertebra().and_then(Vertebra::reference) {
-            self.tracking.note_pose(index, &reference, plant.joint_pose(index));
+            self.tracking
+                .note_pose(index, &reference, plant.joint_pose(index));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -44,6 +44,13 @@ impl Records {
     /// What the file system says.
     pub fn create(folder: &Path) -> std::io::Result<Self> {
         std::fs::create_dir_all(folder)?;
+        // What is written last would else be an older run's until then.
+        for name in ["stride.svg", "summary.json"] {
+            match std::fs::remove_file(folder.join(name)) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
         let mut states = BufWriter::new(File::create(folder.join("states.csv"))?);
         states.write_all(header().as_bytes())?;
         Ok(Self {
@@ -69,7 +76,12 @@ impl Records {
 
     /// Takes a frame that ended at `time_ns`.
     pub fn frame(&mut self, time_ns: u64, frame: &Frame) {
-        let record = Record { time_ns, interface: INTERFACE, frame: *frame, direction: None };
+        let record = Record {
+            time_ns,
+            interface: INTERFACE,
+            frame: *frame,
+            direction: None,
+        };
         write_line(&mut self.frames, &record);
         if self.frames.len() >= CHUNK {
             self.flush();
@@ -79,16 +91,24 @@ impl Records {
     /// Takes a row of states.
     ///
     /// # Errors
-    /// What the file system says, with the folder.
+    /// What the file system says of it or said of a frame, with the file.
     pub fn state(&mut self, robot: &Robot) -> anyhow::Result<()> {
-        let Some(file) = &mut self.states else { return Ok(()) };
+        self.check_frames()?;
+        let Some(file) = &mut self.states else {
+            return Ok(());
+        };
         let plant = robot.plant();
         self.line.clear();
         write!(self.line, "{:.6}", robot.now_ns() as f64 / 1e9)?;
         for value in plant.centre_of_mass().into_iter().chain(plant.tail_edge()) {
             write!(self.line, ",{value:.6}")?;
         }
-        write!(self.line, ",{:.4},{:.3}", plant.joint_power_w(), plant.supply_v())?;
+        write!(
+            self.line,
+            ",{:.4},{:.3}",
+            plant.joint_power_w(),
+            plant.supply_v()
+        )?;
         for id in NodeId::all() {
             let index = id.index();
             for value in plant.joint_pose(index) {
@@ -108,36 +128,53 @@ impl Records {
                 write!(self.line, ",{value:.4}")?;
             }
             let state = robot.node(id).state();
-            write!(self.line, ",{}", state.map_or("", eel_protocol::State::name))?;
+            write!(
+                self.line,
+                ",{}",
+                state.map_or("", eel_protocol::State::name)
+            )?;
         }
         self.line.push('\n');
-        file.write_all(self.line.as_bytes()).context("can't write states.csv")
+        file.write_all(self.line.as_bytes())
+            .context("can't write states.csv")
     }
 
-    /// Closes everything and adds the picture.
+    /// Closes everything and adds the picture, if there is one.
     ///
     /// # Errors
     /// What the file system said at any time.
-    pub fn finish(mut self, drawing: &str) -> anyhow::Result<Written> {
+    pub fn finish(mut self, drawing: Option<&String>) -> anyhow::Result<Written> {
         self.flush();
-        if let Some(error) = self.failure {
-            return Err(error).context("can't write bus.log");
-        }
+        self.check_frames()?;
         let mut paths = Vec::new();
         if let Some(mut states) = self.states {
             states.flush().context("can't write states.csv")?;
         }
         if let Some(folder) = self.folder {
-            std::fs::write(folder.join("stride.svg"), drawing).context("can't write stride.svg")?;
-            for name in ["bus.log", "states.csv", "stride.svg", "summary.json"] {
-                paths.push(folder.join(name));
+            paths.extend(["bus.log", "states.csv"].map(|name| folder.join(name)));
+            if let Some(drawing) = drawing {
+                let path = folder.join("stride.svg");
+                std::fs::write(&path, drawing).context("can't write stride.svg")?;
+                paths.push(path);
             }
+            paths.push(folder.join("summary.json"));
         }
         let mut frame_log_sha256 = String::with_capacity(64);
         for byte in self.hash.finalize() {
             write!(frame_log_sha256, "{byte:02x}")?;
         }
-        Ok(Written { frame_log_sha256, paths })
+        Ok(Written {
+            frame_log_sha256,
+            paths,
+        })
+    }
+
+    /// Tells what went wrong with the frame log, once.
+    fn check_frames(&mut self) -> anyhow::Result<()> {
+        self.failure
+            .take()
+            .map_or(Ok(()), Err)
+            .context("can't write bus.log")
     }
 
     fn flush(&mut self) {

@@ -6,12 +6,15 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::plant::measures::Figures;
+use crate::robot::NODES;
 
 /// What came of a run. The fields are the keys of `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Simulated time of swimming, s.
+    /// Simulated time of swimming before the stop, s.
     pub seconds: f64,
+    /// Whether the stop began earlier than planned.
+    pub interrupted: bool,
     /// Simulated time with the stop, s.
     pub simulated_s: f64,
     /// Cycles a second, Hz.
@@ -39,7 +42,7 @@ pub struct Summary {
     pub boots: u32,
     /// Frames on the bus.
     pub frames: u64,
-    /// Frames lost: in full FIFOs and queues, by gaps in counters, by wrong protection bytes.
+    /// Frames lost: in full FIFOs and queues, and by gaps in counters.
     pub frames_lost: u64,
     /// Share of the time in which the bus was busy, exact from the bits of its frames, %.
     pub bus_load_percent: f64,
@@ -87,7 +90,9 @@ pub struct NodeSummary {
 
 impl From<Option<Figures>> for SwimFigures {
     fn from(figures: Option<Figures>) -> Self {
-        let Some(figures) = figures else { return Self::default() };
+        let Some(figures) = figures else {
+            return Self::default();
+        };
         Self {
             speed_m_s: Some(figures.speed_m_s),
             stride_body_lengths: Some(figures.stride_body_lengths),
@@ -97,6 +102,39 @@ impl From<Option<Figures>> for SwimFigures {
             mean_power_w: Some(figures.mean_power_w),
             unsteadiness: Some(figures.unsteadiness),
         }
+    }
+}
+
+impl Summary {
+    /// Returns what is not as it should be, a sentence each.
+    pub fn complaints(&self) -> Vec<String> {
+        let Self {
+            nodes_operational,
+            frames_lost,
+            seconds,
+            ..
+        } = self;
+        let mut complaints = Vec::new();
+        if self.interrupted {
+            complaints.push(format!(
+                "stopped early, after {seconds:.2} s; the records hold what happened until then"
+            ));
+        }
+        if *nodes_operational < NODES {
+            complaints.push(format!(
+                "{nodes_operational} of {NODES} vertebrae followed the gait when the stop began; \
+                 states.csv shows the state of each"
+            ));
+        }
+        if *frames_lost > 0 {
+            complaints.push(format!(
+                "{frames_lost} frames were lost on the bus or in queues"
+            ));
+        }
+        if !self.stopped_in_order {
+            complaints.push("the eel was not straightened and switched off at the end".to_owned());
+        }
+        complaints
     }
 }
 
@@ -119,15 +157,37 @@ impl fmt::Display for Summary {
                 "  speed and stride   need six cycles after the start: swim for longer"
             )?,
         }
-        row(out, "bus load", format_args!("{:.2} %", self.bus_load_percent))?;
-        row(out, "frames", format_args!("{} ({} lost)", self.frames, self.frames_lost))?;
-        row(out, "vertebrae", format_args!("{} operational", self.nodes_operational))?;
+        row(
+            out,
+            "bus load",
+            format_args!("{:.2} %", self.bus_load_percent),
+        )?;
+        row(
+            out,
+            "frames",
+            format_args!("{} ({} lost)", self.frames, self.frames_lost),
+        )?;
+        row(
+            out,
+            "vertebrae",
+            format_args!("{} operational", self.nodes_operational),
+        )?;
         row(out, "emergencies", format_args!("{}", self.emergencies))?;
-        let stop =
-            if self.stopped_in_order { "straightened, switched off" } else { "not in order" };
+        let stop = if self.stopped_in_order {
+            "straightened, switched off"
+        } else {
+            "not in order"
+        };
         row(out, "stop", format_args!("{stop}"))?;
-        row(out, "real-time factor", format_args!("{:.1}", self.real_time_factor))?;
-        writeln!(out, "\n  vertebra   peak yaw   peak torque   worst tracking error")?;
+        row(
+            out,
+            "real-time factor",
+            format_args!("{:.1}", self.real_time_factor),
+        )?;
+        writeln!(
+            out,
+            "\n  vertebra   peak yaw   peak torque   worst tracking error"
+        )?;
         for node in &self.nodes {
             writeln!(
                 out,
@@ -149,13 +209,29 @@ impl fmt::Display for Summary {
 /// Writes the figures of the swim.
 fn swimming(out: &mut fmt::Formatter<'_>, figures: &SwimFigures) -> fmt::Result {
     let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    row(out, "forward speed", format_args!("{:.3} m/s", number(figures.speed_m_s)))?;
-    row(out, "stride", format_args!("{:.3} L per cycle", number(figures.stride_body_lengths)))?;
+    row(
+        out,
+        "forward speed",
+        format_args!("{:.3} m/s", number(figures.speed_m_s)),
+    )?;
+    row(
+        out,
+        "stride",
+        format_args!("{:.3} L per cycle", number(figures.stride_body_lengths)),
+    )?;
     row(out, "slip", format_args!("{:.3}", number(figures.slip)))?;
-    row(out, "Strouhal number", format_args!("{:.3}", number(figures.strouhal)))?;
+    row(
+        out,
+        "Strouhal number",
+        format_args!("{:.3}", number(figures.strouhal)),
+    )?;
     let tail = number(figures.tail_amplitude_body_lengths);
     row(out, "tail amplitude", format_args!("{tail:.4} L"))?;
-    row(out, "mechanical power", format_args!("{:.2} W", number(figures.mean_power_w)))
+    row(
+        out,
+        "mechanical power",
+        format_args!("{:.2} W", number(figures.mean_power_w)),
+    )
 }
 
 fn row(out: &mut fmt::Formatter<'_>, name: &str, value: fmt::Arguments<'_>) -> fmt::Result {

@@ -2,51 +2,13 @@
 
 use std::env;
 use std::process::{Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 
-use eel_protocol::{Cob, Frame, VERTEBRAE, identity};
-use eel_transport::SocketBus;
+use eel_protocol::{Cob, Frame, NodeId, VERTEBRAE, identity};
 use eel_transport::candump::{Line, parse_line};
-use hil_sim::plant::Config;
-use hil_sim::realtime::{Counters, Realtime};
 use serde_json::Value;
 
+use crate::nodes::Nodes;
 use crate::support::{Program, interface, listeners, wait_for_listeners};
-
-/// The nodes in a thread of their own until they are told to stop.
-struct Nodes {
-    stop: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<Counters>>,
-}
-
-impl Nodes {
-    fn start(interface: &str) -> Self {
-        let bus = SocketBus::open(interface).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&stop);
-        let thread = thread::spawn(move || {
-            let mut nodes = Realtime::new(bus, &Config::default(), 1);
-            nodes.run(|| !told.load(Ordering::Relaxed)).unwrap()
-        });
-        Self {
-            stop,
-            thread: Some(thread),
-        }
-    }
-
-    fn end(mut self) -> Counters {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap()
-    }
-}
-
-impl Drop for Nodes {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-    }
-}
 
 /// Runs the Python script and returns what it found by node id.
 fn meet(interface: &str) -> Value {
@@ -71,7 +33,7 @@ fn python_canopen_meets_ten_vertebrae_and_candump_sees_them() {
     let before = listeners();
     let candump = Program::start(&["candump", "-L", &name]);
     wait_for_listeners(before, 1);
-    let nodes = Nodes::start(&name);
+    let nodes = Nodes::start(&name, NodeId::all().collect());
     let found = meet(&name);
     let counters = nodes.end();
     candump.interrupt();

@@ -1,0 +1,43 @@
+//! Simulated vertebrae on the interface.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use eel_protocol::NodeId;
+use eel_transport::SocketBus;
+use hil_sim::plant::Config;
+use hil_sim::realtime::{Counters, Realtime};
+
+/// Vertebrae in a thread of their own until they are told to stop.
+pub struct Nodes {
+    stop: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<Counters>>,
+}
+
+impl Nodes {
+    pub fn start(interface: &str, chosen: Vec<NodeId>) -> Self {
+        let bus = SocketBus::open(interface).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&stop);
+        let thread = thread::spawn(move || {
+            let mut nodes = Realtime::with_nodes(bus, &Config::default(), 1, &chosen);
+            nodes.run(|_| !told.load(Ordering::Relaxed)).unwrap()
+        });
+        Self {
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    pub fn end(mut self) -> Counters {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap()
+    }
+}
+
+impl Drop for Nodes {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
