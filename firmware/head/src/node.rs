@@ -14,6 +14,9 @@ const NMT_RETRY: Duration = Duration::from_millis(50);
 const BLEND: Duration = Duration::from_millis(1_000);
 /// "Off" targets before the first "run": one arms the vertebra, the others may get lost.
 const OFFS: u8 = 3;
+/// "Run" targets without effect, after which the vertebra is told "off" again: one that refused
+/// wants that before the next "run".
+const RUNS: u8 = 20;
 /// One in Q15.
 const ONE: i64 = 1 << 15;
 
@@ -72,6 +75,7 @@ pub(crate) struct Tracker {
     counter: Counter,
     report_counter: Option<Counter>,
     offs: u8,
+    runs: u8,
     reset_wanted: bool,
     run_since: Instant,
     start_pose: Pose,
@@ -94,6 +98,7 @@ impl Tracker {
             counter: Counter::default(),
             report_counter: None,
             offs: 0,
+            runs: 0,
             reset_wanted: false,
             run_since: Instant::ZERO,
             start_pose: Pose::default(),
@@ -117,6 +122,7 @@ impl Tracker {
     fn enter(&mut self, stage: Stage) {
         self.status.stage = stage;
         self.offs = 0;
+        self.runs = 0;
         self.reset_wanted = false;
         if matches!(stage, Stage::Missing | Stage::Booted) {
             self.status.state = State::NotReady;
@@ -225,7 +231,7 @@ impl Tracker {
             }
             (Stage::Running, Wish::Run | Wish::Keep) => (Mode::Run, self.blend(now, gait)),
             // Where it says it is, until it says that it runs: nothing jumps, whenever it begins.
-            (Stage::Enabling, Wish::Run) => (Mode::Run, self.hold()),
+            (Stage::Enabling, Wish::Run) if self.runs < RUNS => (Mode::Run, self.hold()),
             (Stage::Started, Wish::Run) if self.may_run() => {
                 self.enter(Stage::Enabling);
                 (Mode::Run, self.hold())
@@ -248,8 +254,9 @@ impl Tracker {
         }
     }
 
-    /// Returns the pose that the vertebra reports; from there it is led to the gait.
+    /// Asks once more to run where the vertebra says it is; from there it is led to the gait.
     const fn hold(&mut self) -> Pose {
+        self.runs = self.runs.saturating_add(1);
         self.start_pose = self.status.pose;
         self.start_pose
     }

@@ -122,7 +122,7 @@ fn a_vertebra_that_enables_late_is_not_pulled_to_where_the_gait_has_got_meanwhil
     let mut spine = Spine::new();
     spine.node(10).obeys = false;
     spine.run(5_000);
-    assert_eq!(spine.stage(10), Stage::Enabling);
+    assert_eq!(spine.head.running(), 9);
     assert_eq!(spine.head.phase(), Phase::Swimming, "the other nine swim");
     let pose = spine.node(10).pose;
     let late = spine.now_ms;
@@ -138,11 +138,41 @@ fn a_vertebra_that_enables_late_is_not_pulled_to_where_the_gait_has_got_meanwhil
 }
 
 #[test]
+fn a_vertebra_that_refuses_to_run_is_told_off_again_before_the_next_run() {
+    let mut spine = Spine::new();
+    spine.node(7).obeys = false;
+    spine.run(2_000);
+    let modes: Vec<Mode> = spine
+        .targets(7)
+        .iter()
+        .map(|(_, target)| target.mode)
+        .collect();
+    let rows: Vec<(Mode, usize)> = modes
+        .chunk_by(|one, other| one == other)
+        .map(|row| (row[0], row.len()))
+        .collect();
+    assert_eq!(
+        rows[1..5],
+        [
+            (Mode::Run, 20),
+            (Mode::Off, 3),
+            (Mode::Run, 20),
+            (Mode::Off, 3)
+        ]
+    );
+    spine.node(7).obeys = true;
+    spine.run(400);
+    assert_eq!(spine.stage(7), Stage::Running);
+}
+
+#[test]
 fn a_vertebra_whose_enabling_is_refused_meanwhile_starts_with_off_again() {
     let mut spine = Spine::new();
     spine.node(2).obeys = false;
-    spine.run(1_000);
-    assert_eq!(spine.stage(2), Stage::Enabling);
+    while spine.stage(2) != Stage::Enabling {
+        spine.run(1);
+    }
+    spine.run(15);
     spine.node(2).willing = false;
     spine.run(30);
     assert_eq!(spine.stage(2), Stage::Started);

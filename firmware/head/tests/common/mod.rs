@@ -16,7 +16,7 @@ pub struct Fake {
     pub on: bool,
     /// Whether nothing stands against enabling it.
     pub willing: bool,
-    /// Whether it follows a "run" at once, or stays ready.
+    /// Whether it follows a "run", or refuses, stays ready and wants an "off" first.
     pub obeys: bool,
     pub operational: bool,
     pub state: State,
@@ -141,6 +141,7 @@ impl Fake {
                 self.state = State::Run;
                 self.pose = Pose { yaw, pitch, roll };
             }
+            Mode::Run => self.armed = false,
             Mode::Off => {
                 self.armed = true;
                 if self.state == State::Run {
