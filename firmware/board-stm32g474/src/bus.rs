@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use eel_protocol::{Cob, Frame, HEAD_NODE, NodeId};
 use embassy_futures::select::{Either, select};
-use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming};
+use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::filter::{Action, Filter, FilterType, StandardFilter};
 use embassy_stm32::can::frame::Header;
 use embassy_stm32::can::{Can, CanConfigurator, CanRx, CanTx, Frame as HalFrame};
@@ -67,6 +67,9 @@ pub fn start(connections: Connections, node: NodeId) -> Can<'static> {
         .config()
         .set_nominal_bit_timing(BIT_TIMING)
         .set_global_filter(GlobalFilter::reject_all())
+        // In priority mode frames with one identifier can overtake each other, as a new one takes the
+        // lowest free buffer: segments of an SDO transfer and emergencies would change places.
+        .set_tx_buffer_mode(TxBufferMode::Fifo)
         .set_automatic_bus_off_recovery(true);
     bus.set_config(config);
     bus.properties().set_standard_filters(&filters(node));
@@ -140,23 +143,22 @@ pub async fn receive(mut bus: CanRx<'static>) {
     }
 }
 
-/// Brings frames from the control tick to the controller, which sends the most urgent first.
+/// Brings frames from the control tick to the controller, which sends them in their order.
 #[embassy_executor::task]
 pub async fn transmit(mut bus: CanTx<'static>) {
     loop {
         liveness::TRANSMIT.advance();
         let next = select(TO_SEND.receive(), Timer::after_millis(PULSE_MS)).await;
         let Either::First(frame) = next else { continue };
-        let Some(mut waiting) = to_hal(&frame) else {
+        let Some(waiting) = to_hal(&frame) else {
             continue;
         };
         let mut patience = PATIENCE;
         while patience > 0 {
             liveness::TRANSMIT.advance();
             match select(bus.write(&waiting), Timer::after_millis(PULSE_MS)).await {
-                Either::First(None) => break,
-                // A less urgent frame gave up its place.
-                Either::First(Some(displaced)) => waiting = displaced,
+                // A FIFO never gives a frame back.
+                Either::First(_) => break,
                 Either::Second(()) => patience -= 1,
             }
         }

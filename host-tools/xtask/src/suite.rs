@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::process::{cargo, clean_root, output, run};
+use crate::process::{cargo, clean_root, output, run, target_dir};
 use crate::{firmware, generated, panics, setup, vcan};
 
 /// One step: its name, and whether it needs a tool beyond cargo.
@@ -16,7 +16,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 9] = [
+const STEPS: [Step; 10] = [
     Step {
         name: "tools",
         needs_tools: true,
@@ -62,6 +62,11 @@ const STEPS: [Step; 9] = [
         needs_tools: false,
         run: run_main_job,
     },
+    Step {
+        name: "debug and release agree",
+        needs_tools: false,
+        run: compare_profiles,
+    },
 ];
 
 /// Runs every step and prints what each took.
@@ -83,13 +88,13 @@ pub fn run_all(fast: bool, stop: bool) -> Result<()> {
             break;
         }
     }
-    println!("\n{:<20} {:>8}  result", "step", "seconds");
+    println!("\n{:<24} {:>8}  result", "step", "seconds");
     for (name, result, time) in &results {
         let word = if result.is_ok() { "ok" } else { "FAILED" };
-        println!("{name:<20} {:>8.1}  {word}", time.as_secs_f64());
+        println!("{name:<24} {:>8.1}  {word}", time.as_secs_f64());
     }
     let total: Duration = results.iter().map(|(_, _, time)| *time).sum();
-    println!("{:<20} {:>8.1}", "all", total.as_secs_f64());
+    println!("{:<24} {:>8.1}", "all", total.as_secs_f64());
     let failed: Vec<_> = results
         .iter()
         .filter(|(_, result, _)| result.is_err())
@@ -168,6 +173,38 @@ fn run_main_job() -> Result<()> {
     let out = clean_root().join("target/main-job");
     let arguments = ["run", "--release", "--", "swim", "--seconds", "2", "--out"];
     run(cargo().args(arguments).arg(out))
+}
+
+/// Tells whether the same seed gives the same frames in the debug and in the release program.
+fn compare_profiles() -> Result<()> {
+    let log_hash = |profile: &str| -> Result<String> {
+        let out = target_dir().join("agree").join(profile);
+        let mut swim = cargo();
+        swim.args([
+            "run",
+            "--quiet",
+            "--profile",
+            profile,
+            "--package",
+            "hil-sim",
+            "--",
+        ])
+        .args(["swim", "--seconds", "3", "--json", "--out"])
+        .arg(out);
+        let text = output(&mut swim)?;
+        let summary: serde_json::Value =
+            serde_json::from_str(&text).context("hil-sim --json printed no JSON")?;
+        let hash = summary["frame_log_sha256"].as_str().map(str::to_owned);
+        hash.context("hil-sim --json has no frame_log_sha256")
+    };
+    let (debug, release) = (log_hash("dev")?, log_hash("release")?);
+    println!("frame log in debug    {debug}\nframe log in release  {release}");
+    ensure!(
+        debug == release,
+        "the same seed gives other frames in debug than in release; compare \
+         target/agree/dev/bus.log with target/agree/release/bus.log"
+    );
+    Ok(())
 }
 
 fn path_text(path: &OsStr) -> String {
