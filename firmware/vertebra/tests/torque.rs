@@ -1,0 +1,242 @@
+//! Torque: what the duties make of winding, supply and speed never passes its bounds, and the limit
+//! code tells which bound acted.
+
+use eel_kinematics::{Joints, Wrist};
+use eel_protocol::{Effort, LimitCode, Mode, State};
+use eel_units::{Current, Temperature, Voltage};
+use eel_vertebra::{Drive, Limits, Motor};
+
+use support::{Bench, NODE, Random, duty, pose, radians};
+
+mod support;
+
+/// Torque constant in N·m/A and resistance in Ω of the prototype's motors.
+const CONSTANT: f64 = Motor::PROTOTYPE.torque_constant as f64 / 1e6;
+const RESISTANCE: f64 = Motor::PROTOTYPE.resistance as f64 / 1e3;
+
+/// A bench whose motors have windings: each tick measures the current that the last duty drives.
+struct Windings {
+    bench: Bench,
+    last: [f64; 3],
+}
+
+impl Windings {
+    fn new(bench: Bench) -> Self {
+        let last = angles(&bench);
+        Self { bench, last }
+    }
+
+    /// Lets a tick pass; returns the torque that each duty drives, in N·m.
+    fn tick(&mut self) -> [f64; 3] {
+        self.bench.tick();
+        let supply = f64::from(self.bench.sample.supply.to_millivolts()) / 1e3;
+        let now = angles(&self.bench);
+        let mut torque = [0.0; 3];
+        for motor in 0..3 {
+            let speed = (now[motor] - self.last[motor]) * 1e3;
+            let Some(duty) = duty(self.bench.drives[motor]) else {
+                continue;
+            };
+            let voltage = supply * f64::from(duty.to_q15()) / 32_767.0;
+            let current = (voltage - CONSTANT * speed) / RESISTANCE;
+            torque[motor] = CONSTANT * current;
+            self.bench.sample.current[motor] = Current::from_microamps((current * 1e6) as i32);
+        }
+        self.last = now;
+        torque
+    }
+}
+
+fn angles(bench: &Bench) -> [f64; 3] {
+    let Joints(angles) = Wrist::PAPER.inverse(&bench.pose).unwrap().joints;
+    angles.map(radians)
+}
+
+/// Returns the limit codes of the last effort report.
+fn limits(bench: &Bench) -> [LimitCode; 3] {
+    let id = 0x280 + u16::from(NODE);
+    let mut reports = bench.sent.iter().rev();
+    let report = reports
+        .find(|sent| sent.frame.cob_id() == Some(id))
+        .unwrap();
+    Effort::from_bytes(report.frame.data().try_into().unwrap())
+        .unwrap()
+        .limit
+}
+
+/// Returns a wrist that stands 0.2 rad of yaw from where it is asked to be.
+fn pulled() -> Windings {
+    let mut bench = Bench::running();
+    bench.follows = false;
+    bench.target = pose(200, 0, 0);
+    Windings::new(bench)
+}
+
+#[test]
+fn torque_never_passes_the_peak_nor_the_current_limit_for_any_target_and_supply() {
+    let mut random = Random(0xB0B);
+    let peak = f64::from(Limits::PROTOTYPE.peak_torque.to_millinewton_metres()) / 1e3;
+    let limit = CONSTANT * f64::from(Motor::PROTOTYPE.current_limit.to_microamps()) / 1e6;
+    let bound = peak.min(limit) * 1.01 + 0.005;
+    let (mut saturated, mut largest) = (0, 0.0_f64);
+    for _ in 0..20 {
+        let mut bench = Bench::running();
+        bench.follows = false;
+        let mut windings = Windings::new(bench);
+        for _ in 0..100 {
+            let bench = &mut windings.bench;
+            bench.sample.supply = Voltage::from_millivolts(random.within(17_500, 30_500));
+            bench.target = pose(
+                random.within(-600, 600),
+                random.within(-300, 300),
+                random.within(-80, 80),
+            );
+            for _ in 0..30 {
+                for torque in windings.tick() {
+                    assert!(torque.abs() <= bound, "{torque} N.m of {bound}");
+                    largest = largest.max(torque.abs());
+                    saturated += u32::from(torque.abs() > 0.9 * peak);
+                }
+            }
+            assert_eq!(windings.bench.state(), State::Run);
+        }
+    }
+    assert!(
+        saturated > 1_000,
+        "the test asks for too little: {saturated}"
+    );
+    assert!(largest > 0.95 * peak, "{largest}");
+}
+
+#[test]
+fn a_moving_wrist_keeps_its_bounds_too() {
+    let mut random = Random(0xEE1);
+    let mut windings = Windings::new(Bench::running());
+    let bound = f64::from(Limits::PROTOTYPE.peak_torque.to_millinewton_metres()) / 1e3;
+    let mut worst = 0.0_f64;
+    for _ in 0..200 {
+        windings.bench.target = pose(
+            random.within(-500, 500),
+            random.within(-250, 250),
+            random.within(-60, 60),
+        );
+        for _ in 0..50 {
+            for torque in windings.tick() {
+                worst = worst.max(torque.abs());
+            }
+        }
+        assert_eq!(windings.bench.state(), State::Run);
+    }
+    // The duty knows the speed of the tick before, low-passed at 300 rad/s: where the bench's wrist
+    // jumps into motion at once, back-EMF is missing for some ticks.
+    let missing = CONSTANT * CONSTANT * 10.0 / RESISTANCE;
+    assert!(worst <= bound + missing, "{worst} N.m");
+}
+
+#[test]
+fn the_limit_code_names_the_bound_that_acts() {
+    type Set = fn(&mut Bench);
+    let cases: [(LimitCode, Set); 6] = [
+        (LimitCode::Peak, |_| {}),
+        (LimitCode::Undervoltage, |bench| {
+            bench.sample.supply = Voltage::from_millivolts(18_000);
+        }),
+        (LimitCode::Overvoltage, |bench| {
+            bench.sample.supply = Voltage::from_millivolts(30_000);
+        }),
+        (LimitCode::Board, |bench| {
+            bench.sample.board_temperature = Temperature::from_decidegrees(850);
+        }),
+        (LimitCode::Thermal, |bench| {
+            bench.sample.motor_temperature = [Temperature::from_decidegrees(950); 3];
+        }),
+        (LimitCode::None, |bench| bench.target = pose(2, 0, 0)),
+    ];
+    for (code, set) in cases {
+        let mut windings = pulled();
+        set(&mut windings.bench);
+        let mut torque = [0.0; 3];
+        for _ in 0..100 {
+            torque = windings.tick();
+        }
+        let named = limits(&windings.bench);
+        // Yaw is the sum of motors 1 and 2; one of them runs out first and is named.
+        assert!(
+            named[..2].contains(&code),
+            "{code:?}: {named:?} at {torque:?}"
+        );
+        let share = match code {
+            LimitCode::Peak => 1.0,
+            LimitCode::None => 0.8 / 6.0,
+            LimitCode::Thermal => 0.25,
+            _ => 1.0 / 3.0,
+        };
+        let sum = torque[0] + torque[1];
+        assert!((sum - 6.0 * share).abs() < 0.1, "{code:?}: {sum} N.m");
+    }
+}
+
+#[test]
+fn the_end_of_travel_takes_the_torque_that_leads_out_and_names_itself() {
+    let mut settings = eel_vertebra::Settings::prototype(support::node(), 1);
+    // Motor 1 stands at 0; its travel ends here.
+    settings.limits.travel[0].high = eel_units::Angle::from_milliradians(1);
+    settings.limits.travel[1].high = eel_units::Angle::from_milliradians(1);
+    let mut bench = Bench::with(settings);
+    bench.nmt(eel_canopen::NmtCommand::Start);
+    bench.run(400);
+    bench.mode = Mode::Run;
+    bench.run(50);
+    bench.follows = false;
+    let mut windings = Windings::new(bench);
+    let mut pull = |yaw| {
+        windings.bench.target = pose(yaw, 0, 0);
+        let mut torque = [0.0; 3];
+        for _ in 0..200 {
+            torque = windings.tick();
+        }
+        (torque[0], limits(&windings.bench))
+    };
+    let [one, other] = [pull(200), pull(-200)];
+    let (out, back) = if one.0.abs() < other.0.abs() {
+        (one, other)
+    } else {
+        (other, one)
+    };
+    assert!(
+        out.0.abs() < 0.1 && out.1[..2].contains(&LimitCode::Travel),
+        "{out:?}"
+    );
+    assert!(
+        back.0.abs() > 2.9 && back.1[..2].contains(&LimitCode::Peak),
+        "{back:?}"
+    );
+}
+
+#[test]
+fn a_drive_that_is_off_says_so() {
+    let mut bench = Bench::ready();
+    bench.run(30);
+    assert_eq!(limits(&bench), [LimitCode::Off; 3]);
+    bench.mode = Mode::Brake;
+    bench.run(30);
+    assert_eq!(bench.drives, [Drive::Brake; 3]);
+    assert_eq!(limits(&bench), [LimitCode::Off; 3]);
+}
+
+#[test]
+fn damping_on_request_keeps_its_cap() {
+    let mut windings = Windings::new(Bench::enabled(Mode::Damped));
+    windings.bench.follows = false;
+    // Somebody turns the wrist at 3 rad/s.
+    let mut worst = 0.0_f64;
+    for step in 0..100 {
+        windings.bench.pose = pose(step * 3, 0, 0);
+        let torque = windings.tick();
+        if step > 20 {
+            worst = worst.max(torque[0].abs()).max(torque[1].abs());
+        }
+    }
+    assert_eq!(windings.bench.state(), State::Damped);
+    assert!((0.9..=1.05).contains(&worst), "{worst} N.m of 1 N.m");
+}
