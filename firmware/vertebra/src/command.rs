@@ -15,6 +15,8 @@ const PERIOD_RANGE_US: (u32, u32) = (4_000, 21_000);
 /// A SYNC so soon after the segment began is none to follow: a head that sends faster than 200 Hz
 /// must not lead faster than the rate limit.
 const EARLY: Duration = Duration::from_micros(3_500);
+/// A SYNC within 2.5 ms of the expected moment continues the path; later it is overdue.
+const REGULAR_US: i64 = 2_500;
 
 /// What has gone wrong with targets since power-up, for object 0x2030.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +37,10 @@ pub struct CommandStream {
     last_good: Instant,
     bad_in_a_row: u8,
     missed: u8,
+    /// Where the segment begins, which is steadier than when its SYNC came.
     segment_start: Instant,
+    /// When that was decided.
+    begun: Instant,
     last_sync: Instant,
     period: Duration,
     fresh: bool,
@@ -66,6 +71,7 @@ impl CommandStream {
             bad_in_a_row: 0,
             missed: 0,
             segment_start: now,
+            begun: now,
             last_sync: now,
             period: Duration::from_micros(SYNC_PERIOD_US),
             fresh: false,
@@ -97,38 +103,67 @@ impl CommandStream {
         Received::Target(target)
     }
 
-    /// Takes the SYNC at `now`; the next segment begins. Tells how many periods have now passed
-    /// without a target.
-    pub fn synchronise(&mut self, now: Instant) -> u8 {
+    /// Takes the SYNC at `now`, with which the next segment begins unless it is early. Tells how
+    /// many periods have then passed without a target.
+    pub fn synchronise(&mut self, now: Instant) -> Option<u8> {
         let (shortest, longest) = PERIOD_RANGE_US;
         let measured = now.since(self.last_sync).to_micros();
         self.last_sync = now;
-        if (shortest..=longest).contains(&measured) {
-            // A low pass over eight periods: the tick resolves a SYNC to a millisecond only.
-            let smoothed = (self.period.to_micros() * 7 + measured + 4) / 8;
-            self.period = Duration::from_micros(smoothed);
+        let is_early = self.is_early(now);
+        let lateness = self.lateness(now);
+        if is_early {
+            self.fresh = false;
+        } else if lateness.abs() <= REGULAR_US {
+            // The tick resolves a SYNC to a millisecond only: a quarter of that is followed.
+            let begin = self.segment_start + self.period;
+            self.begin(shifted(begin, lateness / 4), now);
+        } else {
+            self.begin(now, now);
         }
-        self.begin_segment(now)
+        if (shortest..=longest).contains(&measured) {
+            let period = i64::from(self.period.to_micros());
+            let error = i64::from(measured) - period;
+            // A low pass over 32 periods, over 8 while it learns another one.
+            let share = if error.abs() <= REGULAR_US { 32 } else { 8 };
+            self.period = Duration::from_micros((period + error / share) as u32);
+        }
+        (!is_early).then(|| self.count_missed())
     }
 
     /// Tells whether a SYNC at `now` would come too soon to begin a segment.
     pub fn is_early(&self, now: Instant) -> bool {
-        now.since(self.segment_start) < EARLY
+        now.since(self.begun) < EARLY
     }
 
-    /// Forgets that a target came, because no segment ends there.
-    pub const fn discard(&mut self) {
-        self.fresh = false;
+    /// Tells whether a SYNC at `now` would begin a segment elsewhere than where the one before ends.
+    pub fn breaks_path(&self, now: Instant) -> bool {
+        !self.is_early(now) && self.lateness(now).abs() > REGULAR_US
+    }
+
+    /// Tells whether a target came for the segment that begins with this SYNC.
+    pub const fn is_fresh(&self) -> bool {
+        self.fresh
     }
 
     /// Tells whether a SYNC is overdue by so much that the path must go on without it.
     pub fn sync_overdue(&self, now: Instant) -> bool {
-        now.since(self.segment_start).to_micros() > self.period.to_micros().saturating_add(2_500)
+        self.lateness(now) > REGULAR_US
     }
 
     /// Begins a segment without a SYNC. Tells how many periods have passed without a target.
-    pub const fn begin_segment(&mut self, now: Instant) -> u8 {
-        self.segment_start = now;
+    pub fn begin_segment(&mut self, now: Instant) -> u8 {
+        let end = self.segment_start + self.period;
+        let is_recent = now.since(end) < self.period;
+        self.begin(if is_recent { end } else { now }, now);
+        self.count_missed()
+    }
+
+    fn begin(&mut self, start: Instant, now: Instant) {
+        self.segment_start = start;
+        self.begun = now;
+    }
+
+    fn count_missed(&mut self) -> u8 {
         if !self.fresh {
             self.missed = self.missed.saturating_add(1);
         }
@@ -136,14 +171,20 @@ impl CommandStream {
         self.missed
     }
 
+    /// Returns by how many µs `now` is past the end of the segment.
+    fn lateness(&self, now: Instant) -> i64 {
+        signed(now, self.segment_start + self.period)
+    }
+
     /// Tells whether no target came for so long that the vertebra must let go.
     pub fn is_lost(&self, now: Instant) -> bool {
         now.since(self.last_good) >= TARGET_TIMEOUT
     }
 
-    /// Returns the time since the segment began, and its length.
-    pub const fn place(&self, now: Instant) -> (Duration, Duration) {
-        (now.since(self.segment_start), self.period)
+    /// Returns the time in µs since the segment began, which is before it by a little where a SYNC
+    /// came sooner than expected, and the segment's length.
+    pub fn place(&self, now: Instant) -> (i64, Duration) {
+        (signed(now, self.segment_start), self.period)
     }
 
     /// Returns what has gone wrong.
@@ -160,6 +201,16 @@ impl CommandStream {
             Received::Ignored
         }
     }
+}
+
+/// Returns the time from `from` to `now` in µs.
+fn signed(now: Instant, from: Instant) -> i64 {
+    i64::from(now.since(from).to_micros()) - i64::from(from.since(now).to_micros())
+}
+
+/// Returns the moment `micros` later, or earlier where they are negative.
+fn shifted(instant: Instant, micros: i64) -> Instant {
+    Instant::from_micros(instant.to_micros().saturating_add_signed(micros))
 }
 
 #[cfg(test)]
@@ -240,10 +291,10 @@ mod tests {
     #[test]
     fn learns_the_period_of_sync() {
         let mut stream = CommandStream::new(at(0));
-        for beat in 1..100 {
+        for beat in 1..400 {
             stream.synchronise(at(beat * 20));
         }
-        let (_, period) = stream.place(at(1_980));
-        assert!(period.to_micros().abs_diff(20_000) < 20, "{period:?}");
+        let (_, period) = stream.place(at(7_980));
+        assert!(period.to_micros().abs_diff(20_000) <= 32, "{period:?}");
     }
 }

@@ -222,11 +222,12 @@ impl Core {
     pub fn synchronise(&mut self, now: Instant) {
         self.timing.note_sync(now);
         self.feed_forward = self.received_feed;
-        if self.stream.is_early(now) {
-            return;
+        if !self.stream.is_fresh() {
+            self.mend_path();
         }
-        let missed = self.stream.synchronise(now);
-        self.continue_path(missed);
+        if let Some(missed) = self.stream.synchronise(now) {
+            self.continue_path(missed);
+        }
     }
 
     /// Begins the next segment of the path after `missed` periods without a target.
@@ -252,6 +253,14 @@ impl Core {
             self.spline.newest()
         };
         self.follow(wanted);
+    }
+
+    /// Lets the path begin again where it is, so that a SYNC out of its rhythm makes no jump.
+    fn mend_path(&mut self) {
+        if self.stream.breaks_path(self.now) {
+            let (elapsed, period) = self.stream.place(self.now);
+            self.spline = Spline::at_rest(self.spline.reference(elapsed, period).pose);
+        }
     }
 
     /// Admits a pose and makes it the end of the next segment.
@@ -280,9 +289,9 @@ impl Core {
             return;
         }
         if self.stream.is_early(self.now) {
-            self.stream.discard();
             return;
         }
+        self.mend_path();
         let wanted = Pose {
             yaw: target.yaw,
             pitch: target.pitch,

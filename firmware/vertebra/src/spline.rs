@@ -62,14 +62,15 @@ impl Spline {
         }
     }
 
-    /// Returns the path's point `elapsed` after its segment of length `period` began; at the
-    /// segment's end it waits.
-    pub fn reference(&self, elapsed: Duration, period: Duration) -> Reference {
-        let period = period.to_micros().clamp(1_000, 100_000);
-        let elapsed = elapsed.to_micros().min(period);
+    /// Returns the path's point `elapsed` µs after its segment of length `period` began. Before and
+    /// after the segment the path goes on straight for half a period, which its neighbours hardly
+    /// differ from; then it waits.
+    pub fn reference(&self, elapsed: i64, period: Duration) -> Reference {
+        let period = i64::from(period.to_micros().clamp(1_000, 100_000));
+        let elapsed = elapsed.clamp(-period / 2, period * 3 / 2);
         // Place in the segment in Q15, and the number of segments in a second.
-        let place = i64::from((elapsed << 15) / period);
-        let per_second = MICROS_PER_SECOND * 16 / i64::from(period);
+        let place = (elapsed << 15) / period;
+        let per_second = MICROS_PER_SECOND * 16 / period;
         let [a, b, c] = self.knots;
         let (yaw, yaw_rate) = axis([a.yaw, b.yaw, c.yaw], place, per_second);
         let (pitch, pitch_rate) = axis([a.pitch, b.pitch, c.pitch], place, per_second);
@@ -81,14 +82,17 @@ impl Spline {
     }
 }
 
-/// Evaluates one axis: `place` in Q15 within the segment, `per_second` segments a second in Q4.
+/// Evaluates one axis: `place` in Q15 within the segment or up to half of it outside, where the
+/// path is straight and still within the hull; `per_second` segments a second in Q4.
 fn axis(knots: [Angle; 3], place: i64, per_second: i64) -> (Angle, AngularVelocity) {
     let [a, b, c] = knots.map(|angle| i64::from(angle.to_q29()));
     let (first, second) = (b - a, c - b);
     // ½(a + b) + u (b − a) + ½ u² (c − 2b + a), with u in Q15: the sum is kept doubled.
-    let bend = ((second - first) * place) >> 15;
-    let doubled = a + b + (((2 * first + bend) * place) >> 15);
+    let inside = place.clamp(0, 1 << 15);
+    let bend = ((second - first) * inside) >> 15;
     let slope = first + bend;
+    let outside = (2 * slope * (place - inside)) >> 15;
+    let doubled = a + b + (((2 * first + bend) * inside) >> 15) + outside;
     // Q29 rad a segment × Q4 segments a second is Q33 rad/s; the quantity is Q24.
     let rate = (slope * per_second) >> 9;
     (
@@ -113,17 +117,17 @@ mod tests {
     #[test]
     fn joins_its_segments_in_position_and_velocity() {
         let mut spline = Spline::at_rest(yaw(0));
-        let mut last = spline.reference(PERIOD, PERIOD);
+        let mut last = spline.reference(10_000, PERIOD);
         for target in [30, 55, -20, -20, 400] {
             spline.push(yaw(target));
-            let start = spline.reference(Duration::ZERO, PERIOD);
+            let start = spline.reference(0, PERIOD);
             assert!(
                 (start.pose.yaw - last.pose.yaw).abs() <= Angle::from_q29(2),
                 "{target}"
             );
             let step = (start.rates[0] - last.rates[0]).abs();
             assert!(step <= AngularVelocity::from_q24(16), "{target}: {step:?}");
-            last = spline.reference(PERIOD, PERIOD);
+            last = spline.reference(10_000, PERIOD);
         }
     }
 
@@ -133,7 +137,7 @@ mod tests {
         for _ in 0..3 {
             spline.push(yaw(100));
         }
-        let reference = spline.reference(PERIOD, PERIOD);
+        let reference = spline.reference(10_000, PERIOD);
         assert_eq!(reference.pose, yaw(100));
         assert_eq!(reference.rates[0], AngularVelocity::ZERO);
     }
@@ -143,15 +147,9 @@ mod tests {
         let mut spline = Spline::at_rest(yaw(10));
         spline.push(yaw(40));
         spline.push(yaw(100));
-        let [before, after] = [3_000, 5_000].map(|t| {
-            spline
-                .reference(Duration::from_micros(t), PERIOD)
-                .pose
-                .yaw
-                .to_q29()
-        });
+        let [before, after] = [3_000, 5_000].map(|t| spline.reference(t, PERIOD).pose.yaw.to_q29());
         let difference = f64::from(after - before) / f64::from(1 << 29) / 2e-3;
-        let rate = spline.reference(Duration::from_micros(4_000), PERIOD).rates[0];
+        let rate = spline.reference(4_000, PERIOD).rates[0];
         let rate = f64::from(rate.to_q24()) / f64::from(1 << 24);
         assert!(
             (rate - difference).abs() < 2e-3,
@@ -164,8 +162,8 @@ mod tests {
         let mut spline = Spline::at_rest(yaw(500));
         for target in [-500, 500, 500, -500] {
             spline.push(yaw(target));
-            for micros in (0..=10_000).step_by(100) {
-                let pose = spline.reference(Duration::from_micros(micros), PERIOD).pose;
+            for micros in (-9_000..=19_000).step_by(100) {
+                let pose = spline.reference(micros, PERIOD).pose;
                 assert!(
                     pose.yaw.abs() <= Angle::from_milliradians(500),
                     "{micros}: {pose:?}"

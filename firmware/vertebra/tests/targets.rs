@@ -284,14 +284,14 @@ fn a_sync_that_jitters_by_a_tick_leaves_the_reference_smooth() {
         steady.tick();
         smooth.push(reference(&steady));
     }
-    // The fastest target moves at 1.9 rad/s. A SYNC a tick early skips a tick of the path, one a
-    // tick late waits for one: the speed between two ticks changes by no more than that speed.
+    // The fastest target moves at 1.9 rad/s; the rhythm of the SYNCs is smoothed, not obeyed.
     let [with, without] = [worst(&path[500..]), worst(&smooth[500..])];
     assert!(
         without < 0.05,
         "{without} rad/s from tick to tick without jitter"
     );
-    assert!(with < 2.2, "{with} rad/s from tick to tick with jitter");
+    println!("from tick to tick {with} rad/s with jitter, {without} without");
+    assert!(with < 1.0, "{with} rad/s from tick to tick with jitter");
     assert!(!bench.holds(Condition::CommandLate));
 }
 
@@ -357,7 +357,7 @@ fn many_targets_and_syncs_in_one_tick_lead_no_faster_than_the_rate_limit() {
             let before = reference(&bench)[0];
             bench.tick();
             let speed = (reference(&bench)[0] - before).abs() * 1e3;
-            assert!(speed <= RATE * 2.5, "{speed} rad/s");
+            assert!(speed <= RATE * 1.001, "{speed} rad/s");
         }
         assert_eq!(bench.state(), State::Run);
     }
