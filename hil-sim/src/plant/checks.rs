@@ -4,6 +4,7 @@
 use std::f64::consts::PI;
 
 use eel_vertebra::Drive;
+use serde::Serialize;
 
 use super::Plant;
 use super::algebra::{Quat, Vec3};
@@ -15,7 +16,7 @@ use super::joint::Tracking;
 use super::random::Random;
 
 /// One check and its outcome.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     /// The check's number and what it looks at.
     pub name: &'static str,

@@ -4,12 +4,13 @@ mod record;
 mod summary;
 mod tracking;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant as WallClock;
 
 use anyhow::Context;
 use eel_head::{Config as HeadConfig, Event as HeadEvent, Gait, Phase};
-use eel_protocol::NodeId;
+use eel_protocol::{NodeId, emergency};
 use eel_units::Instant;
 use eel_vertebra::Vertebra;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -141,7 +142,7 @@ struct Watcher {
     next_row_ns: u64,
     stride_ns: u64,
     boots: u32,
-    emergencies: u32,
+    emergencies: BTreeMap<String, u32>,
 }
 
 impl Watcher {
@@ -164,7 +165,7 @@ impl Watcher {
             next_row_ns: ROW_NS,
             stride_ns: (1e9 / options.frequency_hz) as u64,
             boots: 0,
-            emergencies: 0,
+            emergencies: BTreeMap::new(),
         })
     }
 
@@ -254,7 +255,8 @@ impl Watcher {
             max_tracking_error_rad: self.tracking.worst_error(),
             nodes_operational: operational,
             stopped_in_order: robot.head().phase() == Phase::Stopped,
-            emergencies: self.emergencies,
+            emergencies: self.emergencies.values().sum(),
+            emergency_names: self.emergencies,
             boots: self.boots,
             frames: statistics.frames,
             frames_lost: robot.frames_lost(),
@@ -292,7 +294,13 @@ impl Observer for Watcher {
     fn head(&mut self, _now: Instant, event: HeadEvent) {
         match event {
             HeadEvent::Booted(_) => self.boots += 1,
-            HeadEvent::Emergency(_, report) if report.code != 0 => self.emergencies += 1,
+            HeadEvent::Emergency(_, report) if report.code != 0 => {
+                let name = emergency::from_code(report.code).map_or_else(
+                    || format!("{:04X}", report.code),
+                    |known| known.name.to_owned(),
+                );
+                *self.emergencies.entry(name).or_default() += 1;
+            }
             _ => {}
         }
     }

@@ -1,5 +1,6 @@
 //! What came of a run, as JSON and as a table.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -38,6 +39,8 @@ pub struct Summary {
     pub stopped_in_order: bool,
     /// Emergency frames other than "cleared".
     pub emergencies: u32,
+    /// How many of them have which name.
+    pub emergency_names: BTreeMap<String, u32>,
     /// Times that vertebrae booted.
     pub boots: u32,
     /// Frames on the bus.
@@ -173,6 +176,9 @@ impl fmt::Display for Summary {
             format_args!("{} operational", self.nodes_operational),
         )?;
         row(out, "emergencies", format_args!("{}", self.emergencies))?;
+        for (name, count) in &self.emergency_names {
+            row(out, "", format_args!("{count} {name}"))?;
+        }
         let stop = if self.stopped_in_order {
             "straightened, switched off"
         } else {
