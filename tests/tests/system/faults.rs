@@ -90,6 +90,6 @@ fn targets_outside_the_workspace_are_limited_with_a_reason_and_never_executed() 
         let [yaw, pitch, roll] = watch.pursued[id.index()];
         assert!(yaw <= 0.5237 && pitch <= 0.2619 && roll <= 0.0699, "{id:?} pursued more");
         let [yaw, ..] = watch.truth[id.index()];
-        assert!(yaw < 0.5236 * 1.15, "{id:?} came to {yaw} rad");
+        assert!(yaw < std::f64::consts::FRAC_PI_6 * 1.15, "{id:?} came to {yaw} rad");
     }
 }

@@ -41,7 +41,7 @@ fn ten_vertebrae_swim_as_eels_do() {
     assert!(summary.stopped_in_order);
     assert!(summary.bus_load_percent < 35.0, "{}", summary.bus_load_percent);
     for node in &summary.nodes {
-        assert!(node.peak_yaw_rad < 0.5236, "{node:?} left the workspace");
+        assert!(node.peak_yaw_rad < std::f64::consts::FRAC_PI_6, "{node:?} left the workspace");
         assert!(node.peak_torque_nm < 3.6, "{node:?}");
         assert!(node.max_tracking_error_rad < 0.15, "{node:?}");
     }
