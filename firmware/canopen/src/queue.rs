@@ -11,7 +11,10 @@ pub struct EventQueue<T, const N: usize> {
 
 impl<T, const N: usize> Default for EventQueue<T, N> {
     fn default() -> Self {
-        Self { events: Deque::new(), dropped: 0 }
+        Self {
+            events: Deque::new(),
+            dropped: 0,
+        }
     }
 }
 
@@ -49,6 +52,9 @@ mod tests {
             queue.push(event);
         }
         assert_eq!(queue.dropped(), 2);
-        assert_eq!([queue.pop(), queue.pop(), queue.pop(), queue.pop()], [Some(2), Some(3), Some(4), None]);
+        assert_eq!(
+            [queue.pop(), queue.pop(), queue.pop(), queue.pop()],
+            [Some(2), Some(3), Some(4), None]
+        );
     }
 }

@@ -135,9 +135,14 @@ catalogue! {
         "The wrist's geometry has no solution for this pose: check calibration and mechanics.";
     SINGULAR = 0xFF22 "singular" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER, "",
         "The wrist is too near a singularity to be controlled: check calibration and mechanics.";
+    NOT_FOLLOWING = 0xFF23 "not-following" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER,
+        "error in 0.1 mrad",
+        "The wrist was far from its target for long: it is stuck, miswired, or the gait is too fast.";
     RESIDUAL = 0xFF30 "residual" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER,
         "residual in 0.1 mrad",
-        "The angle sensors contradict each other: check encoders, couplings and the calibration.";
+        "The motors' angles belong to no pose of the home branch: check couplings and calibration.";
+    RESTARTED = 0xFF40 "restarted" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER, "",
+        "It started anew after a failure or in a latched stop: find the cause, then reset the fault.";
 }
 
 /// Returns the catalogue's emergency with this number.
@@ -273,7 +278,9 @@ mod tests {
             (0xFF20, "target-limited"),
             (0xFF21, "out-of-reach"),
             (0xFF22, "singular"),
+            (0xFF23, "not-following"),
             (0xFF30, "residual"),
+            (0xFF40, "restarted"),
         ];
         for (code, name) in pinned {
             assert_eq!(from_code(code).map(|emergency| emergency.name), Some(name));

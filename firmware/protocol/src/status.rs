@@ -18,7 +18,7 @@ pub enum Condition {
     Bridge = 5,
     /// Refuses enabling: the emergency stop line is asserted.
     EmergencyStop = 6,
-    /// Refuses enabling: the angle sensors contradict each other.
+    /// Refuses enabling: the motors' angles belong to no pose.
     Residual = 7,
     /// Refuses enabling: the node is not operational.
     NotOperational = 8,
@@ -101,7 +101,7 @@ impl Condition {
             Self::Temperature => "A board or motor is too hot.",
             Self::Bridge => "A bridge reports a fault.",
             Self::EmergencyStop => "The emergency stop line is asserted.",
-            Self::Residual => "The angle sensors contradict each other.",
+            Self::Residual => "The motors' angles belong to no pose.",
             Self::NotOperational => "The node is not operational.",
             Self::Latched => "A stop or fault is latched and wants a fault reset.",
             Self::CommandLost => "Targets stopped coming.",

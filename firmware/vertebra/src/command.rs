@@ -10,6 +10,8 @@ pub const TARGET_TIMEOUT: Duration = Duration::from_millis(90);
 pub const BRIDGED_PERIODS: u8 = 2;
 /// Bad targets in a row that count as loss.
 const BAD_LIMIT: u8 = 3;
+/// Most steps by which a counter is newer; more means that the frame is an older one.
+const NEWEST_STEP: u8 = 7;
 /// Shortest and longest SYNC period that is believed: 200 Hz and 50 Hz, with a tick to spare.
 const PERIOD_RANGE_US: (u32, u32) = (4_000, 21_000);
 /// A SYNC so soon after the segment began is none to follow: a head that sends faster than 200 Hz
@@ -25,7 +27,7 @@ pub struct TargetCounters {
     pub bad: u32,
     /// Frames that the counter shows never to have arrived.
     pub lost: u32,
-    /// Frames that came twice.
+    /// Frames that came twice, or after newer ones.
     pub repeated: u32,
 }
 
@@ -84,10 +86,14 @@ impl CommandStream {
             Ok(target) => target,
             Err(error) => return self.reject(error),
         };
-        let repeated = self
-            .last
-            .is_some_and(|last| target.counter.since(last) == 0);
-        if repeated {
+        // Whoever speaks after a silence may count anew, but not repeat the last word.
+        let newest = if self.is_lost(now) {
+            u8::MAX
+        } else {
+            NEWEST_STEP
+        };
+        let is_old = |last| !(1..=newest).contains(&target.counter.since(last));
+        if self.last.is_some_and(is_old) {
             self.counters.repeated = self.counters.repeated.saturating_add(1);
             return Received::Ignored;
         }

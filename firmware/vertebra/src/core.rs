@@ -6,8 +6,8 @@ use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, Mode, State, Status};
 use eel_units::{Angle, Instant, Torque};
 
-use crate::command::{BRIDGED_PERIODS, CommandStream, Received};
-use crate::current::{CurrentState, Electrical};
+use crate::command::{BRIDGED_PERIODS, CommandStream, Received, TARGET_TIMEOUT};
+use crate::current::{CurrentState, Electrical, Reading};
 use crate::encoder::{Encoder, EncoderFault};
 use crate::events::{EVENTS, Event};
 use crate::impedance::{FeedForward, Impedance, Motion};
@@ -61,6 +61,8 @@ pub(crate) struct Core {
     limited: Limited,
     warned: bool,
     pub over_current_ticks: [u8; 3],
+    pub lost_ticks: u8,
+    feed_since: Instant,
     pub effort: Effort,
     pub achieved: [Torque; 3],
     pub unallocated: [Torque; 3],
@@ -98,6 +100,8 @@ impl Core {
             limited: Limited::default(),
             warned: false,
             over_current_ticks: [0; 3],
+            lost_ticks: 0,
+            feed_since: now,
             effort: Effort {
                 torque: [Torque::ZERO; 3],
                 limit: [LimitCode::Off; 3],
@@ -124,12 +128,18 @@ impl Core {
         self.estimate(sample);
         self.watch(sample);
         self.bridge_missing_targets();
+        if now.since(self.feed_since) >= TARGET_TIMEOUT {
+            self.forget_feed_forward();
+        }
         let before = self.machine.state();
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
         self.machine
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
         let drives = self.drive(sample);
+        for (state, drive) in self.currents.iter_mut().zip(&drives) {
+            state.note_drive(drive);
+        }
         self.forget_warnings();
         self.report();
         self.end_warnings();
@@ -164,7 +174,7 @@ impl Core {
                     self.pose = motion.direct.rotation.to_pose();
                     self.find_residual();
                 }
-                Err(error) if self.machine.is_enabled() => {
+                Err(error) if self.machine.is_live() => {
                     let emergency = match error {
                         PoseError::OutOfReach => Emergency::OUT_OF_REACH,
                         PoseError::Singular => Emergency::SINGULAR,
@@ -196,6 +206,17 @@ impl Core {
             let missed = self.stream.begin_segment(self.now);
             self.continue_path(missed);
         }
+    }
+
+    /// Takes what RPDO2 brought; it holds for as long as a target would.
+    pub fn receive_feed_forward(&mut self) {
+        self.feed_since = self.now;
+    }
+
+    /// Returns to no feed-forward and the stiffness that is set.
+    pub fn forget_feed_forward(&mut self) {
+        self.received_feed = FeedForward::NEUTRAL;
+        self.feed_forward = FeedForward::NEUTRAL;
     }
 
     /// Drops the warnings that only mean something while the wrist follows.
@@ -334,7 +355,9 @@ impl Core {
         }
         let after = self.machine.state();
         if after != before {
-            self.currents = [CurrentState::default(); 3];
+            self.currents.iter_mut().for_each(CurrentState::restart);
+            self.lost_ticks = 0;
+            self.forget_feed_forward();
             match after {
                 State::Run => self.spline = Spline::at_rest(self.pose),
                 State::Hold => self.hold = self.pose,
@@ -416,6 +439,8 @@ impl Core {
             );
         }
         self.status = self.status.with(Condition::FollowingError, far);
+        let worst = error.iter().map(|axis| axis.abs()).max();
+        self.watch_following(worst.unwrap_or_default());
         self.reference = Some(reference);
         moment
     }
@@ -455,9 +480,16 @@ impl Core {
             let speed = speeds.get(motor).copied().unwrap_or_default();
             let measured = sample.current.get(motor).copied().unwrap_or_default();
             *limit = bounds.reason(shared.bound.get(motor).copied().flatten());
+            let reading = Reading {
+                speed,
+                current: measured,
+                supply: sample.supply,
+            };
             let torque = pick(&shared.torque);
-            let supply = sample.supply;
-            *drive = Drive::Duty(self.electrical.duty(state, torque, speed, measured, supply));
+            *drive = Drive::Duty(
+                self.electrical
+                    .duty(state, torque, &bounds.torque, &reading),
+            );
         }
         self.effort.limit = limit;
         drives

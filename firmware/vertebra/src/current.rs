@@ -4,8 +4,10 @@
 //! slow integral takes up what resistance and supply really are. The 20 kHz loop of the board will
 //! take this place.
 
+use eel_kinematics::Bounds;
 use eel_units::{AngularVelocity, Current, Duty, Torque, Voltage, saturate};
 
+use crate::io::Drive;
 use crate::settings::Motor;
 
 /// Share of the current error that enters the integral each tick, as a shift.
@@ -42,6 +44,40 @@ pub struct CurrentState {
     wanted: Current,
     integral_mv: i64,
     saturated: bool,
+    /// The voltage of the last tick; none where the bridge was open.
+    applied_mv: Option<i64>,
+    emf_mv: i64,
+}
+
+/// What one motor's current depends on, as measured for this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    /// Speed of the motor.
+    pub speed: AngularVelocity,
+    /// Mean current of the tick that ends.
+    pub current: Current,
+    /// Supply of the bridge.
+    pub supply: Voltage,
+}
+
+impl CurrentState {
+    /// Forgets what was learned, but not what the bridge does.
+    pub fn restart(&mut self) {
+        *self = Self {
+            applied_mv: self.applied_mv,
+            emf_mv: self.emf_mv,
+            ..Self::default()
+        };
+    }
+
+    /// Notes what the bridge does until the next tick, where that is no duty.
+    pub fn note_drive(&mut self, drive: &Drive) {
+        match drive {
+            Drive::Off => self.applied_mv = None,
+            Drive::Brake => self.applied_mv = Some(0),
+            Drive::Duty(_) => {}
+        }
+    }
 }
 
 impl Electrical {
@@ -79,28 +115,45 @@ impl Electrical {
     }
 
     /// Returns the duty that lets the motor produce `torque`, from what was measured in the tick
-    /// before.
+    /// before. The current that was measured holds the next one within `bounds`, whatever the
+    /// speed was taken for.
     pub fn duty(
         &self,
         state: &mut CurrentState,
         torque: Torque,
-        speed: AngularVelocity,
-        measured: Current,
-        supply: Voltage,
+        bounds: &Bounds,
+        reading: &Reading,
     ) -> Duty {
-        let error = self.voltage(state.wanted) - self.voltage(measured);
+        let error = self.voltage(state.wanted) - self.voltage(reading.current);
         if !state.saturated {
             let integral = state.integral_mv + (error >> INTEGRAL_SHIFT);
             state.integral_mv = integral.clamp(-INTEGRAL_LIMIT_MV, INTEGRAL_LIMIT_MV);
         }
-        let wanted = (i64::from(torque.to_q24()) * self.microamps_per_newton_metre) >> 24;
-        state.wanted = Current::from_microamps(saturate(wanted))
-            .bounded(-self.current_limit, self.current_limit);
-        let voltage = self.voltage(state.wanted) + self.back_emf(speed) + state.integral_mv;
-        let supply = i64::from(supply.to_millivolts()).max(SUPPLY_FLOOR_MV);
-        state.saturated = voltage.abs() >= supply;
-        let bounded = voltage.clamp(-supply, supply);
-        Duty::from_q15(((bounded * 32_767) / supply) as i32)
+        state.wanted = self.current(torque);
+        let emf = self.back_emf(reading.speed);
+        let voltage = self.voltage(state.wanted) + emf + state.integral_mv;
+        // The voltage that drove the measured current, moved by the change of the back-EMF.
+        let before = match state.applied_mv {
+            Some(applied) => applied + (emf - state.emf_mv),
+            None => emf,
+        };
+        let to_current = |bound: Torque| {
+            before + self.voltage(self.current(bound)) - self.voltage(reading.current)
+        };
+        let (low, high) = (to_current(bounds.low), to_current(bounds.high));
+        let held = voltage.max(low).min(high.max(low));
+        let supply = i64::from(reading.supply.to_millivolts()).max(SUPPLY_FLOOR_MV);
+        let applied = held.clamp(-supply, supply);
+        state.saturated = applied != voltage;
+        state.applied_mv = Some(applied);
+        state.emf_mv = emf;
+        Duty::from_q15(((applied * 32_767) / supply) as i32)
+    }
+
+    /// Returns the current of a torque, within the bridge's limit.
+    fn current(&self, torque: Torque) -> Current {
+        let current = (i64::from(torque.to_q24()) * self.microamps_per_newton_metre) >> 24;
+        Current::from_microamps(saturate(current)).bounded(-self.current_limit, self.current_limit)
     }
 
     fn voltage(&self, current: Current) -> i64 {
@@ -124,16 +177,29 @@ const fn within(value: u32, (least, most): (u32, u32)) -> i64 {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::float_arithmetic, reason = "the oracle is a winding in f64")]
+
     use super::*;
 
     const SUPPLY: Voltage = Voltage::from_millivolts(24_000);
+    const WIDE: Bounds = Bounds {
+        low: Torque::from_millinewton_metres(-3_000),
+        high: Torque::from_millinewton_metres(3_000),
+    };
 
     fn motor() -> Electrical {
         Electrical::new(&Motor::PROTOTYPE)
     }
 
+    fn reading(speed: f64, current: f64) -> Reading {
+        Reading {
+            speed: AngularVelocity::from_milliradians_per_second((speed * 1e3) as i32),
+            current: Current::from_microamps((current * 1e6) as i32),
+            supply: SUPPLY,
+        }
+    }
+
     /// The winding: the current that a duty drives at a speed, with another resistance than set.
-    #[expect(clippy::float_arithmetic, reason = "tests only")]
     fn winding(duty: Duty, speed: f64, resistance: f64) -> f64 {
         let voltage = 24.0 * f64::from(duty.to_q15()) / 32_767.0;
         (voltage - 1.488 * speed) / resistance
@@ -143,8 +209,7 @@ mod tests {
     fn drives_the_current_that_the_torque_needs() {
         let mut state = CurrentState::default();
         let torque = Torque::from_millinewton_metres(1_488);
-        let speed = AngularVelocity::from_milliradians_per_second(3_000);
-        let duty = motor().duty(&mut state, torque, speed, Current::ZERO, SUPPLY);
+        let duty = motor().duty(&mut state, torque, &WIDE, &reading(3.0, 0.0));
         assert!((winding(duty, 3.0, 5.8) - 1.0).abs() < 1e-3);
     }
 
@@ -154,11 +219,28 @@ mod tests {
         let torque = Torque::from_millinewton_metres(744);
         let mut current = 0.0;
         for _ in 0..200 {
-            let measured = Current::from_microamps((current * 1e6) as i32);
-            let duty = motor().duty(&mut state, torque, AngularVelocity::ZERO, measured, SUPPLY);
+            let duty = motor().duty(&mut state, torque, &WIDE, &reading(0.0, current));
             current = winding(duty, 0.0, 7.0);
         }
         assert!((current - 0.5).abs() < 5e-3, "{current}");
+    }
+
+    #[test]
+    fn a_speed_that_is_taken_wrong_does_not_break_the_bound() {
+        // The crank slows down by 60 rad/s² and the observer lags by 2 rad/s.
+        let mut state = CurrentState::default();
+        let peak = 3.0 / 1.488;
+        let mut current = 0.0;
+        let mut speed = 6.0;
+        for tick in 0..100 {
+            let duty = motor().duty(&mut state, WIDE.high, &WIDE, &reading(speed + 2.0, current));
+            speed -= 0.06;
+            current = winding(duty, speed, 5.8);
+            if tick > 0 {
+                assert!(current < peak * 1.02, "{current} A in tick {tick}");
+            }
+        }
+        assert!(current > peak * 0.98, "{current} A at the end");
     }
 
     #[test]
@@ -175,13 +257,17 @@ mod tests {
         let mut state = CurrentState::default();
         for raw in [i32::MIN, -1, 0, 1, i32::MAX] {
             for supply in [i32::MIN, 0, 24_000, i32::MAX] {
-                let duty = motor().duty(
-                    &mut state,
-                    Torque::from_q24(raw),
-                    AngularVelocity::from_q24(raw),
-                    Current::from_microamps(raw),
-                    Voltage::from_millivolts(supply),
-                );
+                let bound = Torque::from_q24(raw);
+                let reading = Reading {
+                    speed: AngularVelocity::from_q24(raw),
+                    current: Current::from_microamps(raw),
+                    supply: Voltage::from_millivolts(supply),
+                };
+                let bounds = Bounds {
+                    low: bound,
+                    high: -bound,
+                };
+                let duty = motor().duty(&mut state, bound, &bounds, &reading);
                 assert!(duty.abs() <= Duty::FULL);
             }
         }

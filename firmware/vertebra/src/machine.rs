@@ -72,7 +72,12 @@ impl Machine {
         matches!(self.state, State::StopDamped | State::StopBrake)
     }
 
-    /// Tells whether the bridges are, or may be, driven.
+    /// Tells whether a motor may carry current: enabled, or stopping.
+    pub const fn is_live(&self) -> bool {
+        self.is_enabled() || self.is_stopping()
+    }
+
+    /// Tells whether the wrist does what the head asks of it.
     pub const fn is_enabled(&self) -> bool {
         matches!(
             self.state,

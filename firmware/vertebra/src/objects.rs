@@ -162,9 +162,9 @@ impl Core {
         Ok(())
     }
 
-    /// Writes a setting, which is refused while the drives are on, a stop included.
+    /// Writes a setting, which is refused while a motor may carry current, and in Operational.
     fn set_setting(&mut self, field: Field, value: i64) -> Result<(), Abort> {
-        if self.machine.is_enabled() || self.machine.is_stopping() {
+        if self.machine.is_live() || self.operational {
             return Err(Abort::DeviceState);
         }
         let angle = Angle::from_tenth_milliradians(value as i16);
@@ -211,9 +211,13 @@ impl Application for Core {
     }
 
     fn rpdo_applied(&mut self, number: u8, cob_id: u16) {
-        if number == 1 {
-            let bytes = self.target.to_bytes();
-            self.receive_target(&bytes, cob_id);
+        match number {
+            1 => {
+                let bytes = self.target.to_bytes();
+                self.receive_target(&bytes, cob_id);
+            }
+            2 => self.receive_feed_forward(),
+            _ => {}
         }
     }
 

@@ -17,6 +17,11 @@ const OVER_CURRENT_TICKS: u8 = 3;
 /// Largest difference between the measured angles and those of the measured pose: 1 mrad.
 const RESIDUAL_LIMIT: Angle = Angle::from_milliradians(1);
 
+/// Deviation from the reference that no wrist has which still follows: 350 mrad.
+const LOST_LIMIT: Angle = Angle::from_milliradians(350);
+/// Ticks for which the deviation may be that large.
+const LOST_TICKS: u8 = 250;
+
 impl Core {
     /// Holds every reading against its limit and decides what may be enabled.
     pub fn watch(&mut self, sample: &Sample) {
@@ -66,7 +71,7 @@ impl Core {
         if let Some(motor) = sample.bridge_fault.iter().position(|fault| *fault) {
             self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
         }
-        if !self.machine.is_enabled() {
+        if !self.machine.is_live() {
             self.over_current_ticks = [0; 3];
             return;
         }
@@ -131,7 +136,7 @@ impl Core {
         };
         let wrong = residual > RESIDUAL_LIMIT;
         self.status = self.status.with(Condition::Residual, wrong);
-        if wrong && self.machine.is_enabled() {
+        if wrong && self.machine.is_live() {
             let detail = residual.to_tenth_milliradians().unsigned_abs();
             self.pending.fault(Emergency::RESIDUAL, None, detail);
         }
@@ -158,6 +163,7 @@ impl Core {
             }
         }
         self.pending.clear();
+        self.forget_feed_forward();
         self.status = self.status.with(Condition::CommandLost, false);
         self.emit(Emergency::CLEARED, Source::WHOLE);
     }
@@ -216,6 +222,21 @@ impl Core {
     /// Hears the head again, which by itself moves nothing.
     pub fn hear_head(&mut self) {
         self.status = self.status.with(Condition::HeadLost, false);
+    }
+
+    /// Faults a wrist that has been far from its reference for too long: a stuck mechanism, a motor
+    /// connected the wrong way round, or a gait that is beyond the motors.
+    pub fn watch_following(&mut self, worst: Angle) {
+        let lost = worst > LOST_LIMIT;
+        self.lost_ticks = if lost {
+            self.lost_ticks.saturating_add(1)
+        } else {
+            0
+        };
+        if self.lost_ticks >= LOST_TICKS {
+            let detail = worst.to_tenth_milliradians().unsigned_abs();
+            self.pending.fault(Emergency::NOT_FOLLOWING, None, detail);
+        }
     }
 
     /// Returns the torque that a stop still allows: it falls to nothing with time.

@@ -51,6 +51,14 @@ impl Vertebra {
         }
     }
 
+    /// Starts a vertebra whose microcontroller ended by a watchdog, a panic or a fault: as at
+    /// power-up, but stopped until a fault reset.
+    pub fn after_failure(settings: Settings, now: Instant) -> Self {
+        let mut vertebra = Self::new(settings, now);
+        vertebra.core.emergency_stop(Emergency::RESTARTED);
+        vertebra
+    }
+
     /// Takes a frame from the bus.
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         self.core.now = now;
@@ -156,8 +164,12 @@ impl Vertebra {
 
     fn follow_nmt(&mut self, now: Instant, command: NmtCommand, state: NmtState) {
         if command == NmtCommand::ResetNode {
+            let was_latched = self.core.machine.state().is_latched();
             self.core = Core::new(self.settings, now);
             self.core.events.push(Event::Reset);
+            if was_latched {
+                self.core.emergency_stop(Emergency::RESTARTED);
+            }
         }
         self.core.operational = state == NmtState::Operational;
         match command {

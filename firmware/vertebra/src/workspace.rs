@@ -74,7 +74,7 @@ pub fn admit(
     (pose, Limited(limited))
 }
 
-/// Tells whether a pose is inside the workspace widened by a quarter, where the hard stops are.
+/// Tells whether a pose is inside the workspace widened by a quarter; the hard stops are inside that.
 pub fn is_believable(pose: &Pose, limits: &Limits) -> bool {
     let range = &limits.workspace;
     let inside = |value: Angle, range: Angle| {

@@ -297,6 +297,13 @@ fn still_works(bench: &mut Bench) {
     bench.nmt(NmtCommand::ResetNode);
     bench.nmt(NmtCommand::Start);
     bench.run(500);
+    if bench.state() == State::StopOff {
+        // It was stopped when it was reset, and still is.
+        bench.mode = Mode::FaultReset;
+        bench.run(20);
+        bench.mode = Mode::Off;
+        bench.run(20);
+    }
     assert_eq!(bench.state(), State::Ready, "{:?}", bench.vertebra.status());
     bench.mode = Mode::Run;
     bench.target = Pose {

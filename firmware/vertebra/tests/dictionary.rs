@@ -136,6 +136,7 @@ fn a_fresh_vertebra_has_the_defaults_of_the_table() {
 #[test]
 fn settings_are_written_and_read_back_while_off() {
     for (mut bench, from) in [(Bench::new(), "not ready"), (Bench::ready(), "ready")] {
+        bench.maintain();
         for (index, sub) in settings() {
             for value in [sub.default / 2 + 1, sub.min.max(1), sub.max, sub.default] {
                 let bytes = encode(sub.data_type, value);
@@ -174,7 +175,7 @@ fn settings_outside_their_bounds_are_refused_and_unchanged() {
 }
 
 #[test]
-fn settings_are_refused_while_anything_drives_the_wrist() {
+fn settings_are_refused_in_operation_and_while_anything_drives_the_wrist() {
     for mode in [Mode::Run, Mode::Hold, Mode::Damped, Mode::Brake] {
         let mut bench = Bench::enabled(mode);
         refuses(&mut bench);
@@ -186,6 +187,8 @@ fn settings_are_refused_while_anything_drives_the_wrist() {
         refuses(&mut bench);
     }
     bench.until(State::StopOff, 2_500);
+    refuses(&mut bench);
+    bench.maintain();
     assert_eq!(set(&mut bench, Field::StiffnessX, 1_000), Ok(()));
 }
 
@@ -219,7 +222,9 @@ fn measurements_and_constants_cannot_be_written() {
 #[test]
 fn a_setting_takes_effect_and_reset_node_takes_it_back() {
     let mut bench = Bench::ready();
+    bench.maintain();
     set(&mut bench, Field::RangeYaw, 1_000).unwrap();
+    bench.operate();
     bench.mode = Mode::Run;
     bench.target = pose(300, 0, 0);
     bench.run(300);
@@ -237,11 +242,13 @@ fn a_setting_takes_effect_and_reset_node_takes_it_back() {
 #[test]
 fn a_setting_that_makes_no_sense_is_a_fault_until_it_is_mended() {
     let mut bench = Bench::ready();
+    bench.maintain();
     set(&mut bench, Field::PeakTorque, 0).unwrap();
     bench.run(10);
     assert_eq!(bench.state(), State::Fault);
     assert!(bench.holds(Condition::Settings));
     set(&mut bench, Field::PeakTorque, 3_000).unwrap();
+    bench.operate();
     bench.recover();
 }
 

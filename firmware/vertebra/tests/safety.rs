@@ -299,7 +299,7 @@ fn warnings_do_not_outlive_the_motion() {
     let mut bench = Bench::running();
     bench.follows = false;
     bench.target = pose(600, 0, 0);
-    bench.run(300);
+    bench.run(200);
     assert!(bench.holds(Condition::FollowingError) && bench.holds(Condition::TargetLimited));
     bench.stream = false;
     bench.until(State::StopDamped, 110);

@@ -15,7 +15,10 @@ fn run(faults: Vec<Fault>, seconds: u64) -> (Robot, Watch) {
 }
 
 fn run_gait(gait: Gait, faults: Vec<Fault>, seconds: u64) -> (Robot, Watch) {
-    let config = Config { faults, ..Config::new(HeadConfig::new(gait), 7) };
+    let config = Config {
+        faults,
+        ..Config::new(HeadConfig::new(gait), 7)
+    };
     let mut robot = Robot::new(&config).expect("the usual bit rate");
     let mut watch = Watch::new();
     robot.run(seconds * SECOND_NS, &mut watch);
@@ -25,17 +28,26 @@ fn run_gait(gait: Gait, faults: Vec<Fault>, seconds: u64) -> (Robot, Watch) {
 #[test]
 fn all_ten_let_go_when_the_head_goes_quiet() {
     const LOST_US: u64 = 4_000_000;
-    let fault = Fault { at_ns: LOST_US * 1_000, kind: FaultKind::HeadSilent };
+    let fault = Fault {
+        at_ns: LOST_US * 1_000,
+        kind: FaultKind::HeadSilent,
+    };
     let (robot, watch) = run(vec![fault], 9);
     for id in NodeId::all() {
         let after = |state| {
             let entered = watch.entered(id, state, LOST_US);
             entered.unwrap_or_else(|| panic!("{id:?} never entered {state:?}")) - LOST_US
         };
-        let (damped, brake, off) =
-            (after(State::StopDamped), after(State::StopBrake), after(State::StopOff));
+        let (damped, brake, off) = (
+            after(State::StopDamped),
+            after(State::StopBrake),
+            after(State::StopOff),
+        );
         println!("{id:?}: damped {damped} µs, braked {brake} µs, off {off} µs after the last word");
-        assert!(damped <= 100_000, "{id:?} was damped only after {damped} µs");
+        assert!(
+            damped <= 100_000,
+            "{id:?} was damped only after {damped} µs"
+        );
         assert!(off <= 2_500_000, "{id:?} was off only after {off} µs");
         let (since, drives) = watch.drives[id.index()];
         assert_eq!(drives, [Kind::Off; 3], "{id:?}");
@@ -47,27 +59,42 @@ fn all_ten_let_go_when_the_head_goes_quiet() {
 #[test]
 fn a_vertebra_that_resets_is_brought_back() {
     let fourth = NodeId::new(4).expect("a vertebra");
-    let fault = Fault { at_ns: 4 * SECOND_NS, kind: FaultKind::NodeReset(fourth) };
+    let fault = Fault {
+        at_ns: 4 * SECOND_NS,
+        kind: FaultKind::NodeReset(fourth),
+    };
     let (robot, watch) = run(vec![fault], 8);
-    let booted = watch.head.iter().filter(|(_, event)| *event == HeadEvent::Booted(fourth));
+    let booted = watch
+        .head
+        .iter()
+        .filter(|(_, event)| *event == HeadEvent::Booted(fourth));
     assert_eq!(booted.count(), 2, "once at the start, once after the reset");
-    let back = watch.entered(fourth, State::Run, 4_000_000).expect("it runs again");
+    let back = watch
+        .entered(fourth, State::Run, 4_000_000)
+        .expect("it runs again");
     println!("back after {} ms", (back - 4_000_000) / 1_000);
     assert!(back < 5_000_000);
     for id in NodeId::all() {
         assert_eq!(robot.node(id).state(), Some(State::Run), "{id:?}");
-        assert_eq!(robot.head().node(id).map(|node| node.stage), Some(Stage::Running));
+        assert_eq!(
+            robot.head().node(id).map(|node| node.stage),
+            Some(Stage::Running)
+        );
         if id != fourth {
-            let runs = watch.states.iter().filter(|(_, node, state)| {
-                *node == id && *state == State::Run
-            });
+            let runs = watch
+                .states
+                .iter()
+                .filter(|(_, node, state)| *node == id && *state == State::Run);
             assert_eq!(runs.count(), 1, "{id:?} went on all the time");
         }
     }
     // Its way back into the wave is a blend, not a jump.
-    assert!(!watch.emergencies.iter().any(|(_, _, report)| {
-        report.code == Emergency::FOLLOWING_ERROR.code
-    }));
+    assert!(
+        !watch
+            .emergencies
+            .iter()
+            .any(|(_, _, report)| { report.code == Emergency::FOLLOWING_ERROR.code })
+    );
 }
 
 #[test]
@@ -76,20 +103,35 @@ fn targets_outside_the_workspace_are_limited_with_a_reason_and_never_executed() 
     let gait = Gait::new(1_000, 1_400, 8_000, Plane::Lateral).expect("a gait");
     let wanted = (0..1_000_000)
         .step_by(10_000)
-        .map(|micros| gait.poses(micros, 1 << 15)[9].yaw.abs().to_tenth_milliradians())
+        .map(|micros| {
+            gait.poses(micros, 1 << 15)[9]
+                .yaw
+                .abs()
+                .to_tenth_milliradians()
+        })
         .max();
-    assert!(wanted > Some(7_000), "the test's own gait is tame: {wanted:?}");
+    assert!(
+        wanted > Some(7_000),
+        "the test's own gait is tame: {wanted:?}"
+    );
     let (_, watch) = run_gait(gait, Vec::new(), 8);
     let last = NodeId::new(10).expect("a vertebra");
-    let limited = watch.emergencies.iter().find(|(_, node, report)| {
-        *node == last && report.code == Emergency::TARGET_LIMITED.code
-    });
+    let limited = watch
+        .emergencies
+        .iter()
+        .find(|(_, node, report)| *node == last && report.code == Emergency::TARGET_LIMITED.code);
     let (_, _, report) = limited.expect("the reason is told");
     assert_eq!(report.source.detail, 1, "yaw is the axis");
     for id in NodeId::all() {
         let [yaw, pitch, roll] = watch.pursued[id.index()];
-        assert!(yaw <= 0.5237 && pitch <= 0.2619 && roll <= 0.0699, "{id:?} pursued more");
+        assert!(
+            yaw <= 0.5237 && pitch <= 0.2619 && roll <= 0.0699,
+            "{id:?} pursued more"
+        );
         let [yaw, ..] = watch.truth[id.index()];
-        assert!(yaw < std::f64::consts::FRAC_PI_6 * 1.15, "{id:?} came to {yaw} rad");
+        assert!(
+            yaw < std::f64::consts::FRAC_PI_6 * 1.15,
+            "{id:?} came to {yaw} rad"
+        );
     }
 }

@@ -28,7 +28,10 @@ fn ten_vertebrae_swim_as_eels_do() {
     let figures = summary.figures;
     let within = |name: &str, value: Option<f64>, low: f64, high: f64| {
         let value = value.unwrap_or_else(|| panic!("{name} is missing"));
-        assert!((low..=high).contains(&value), "{name} is {value}, not in {low}..{high}");
+        assert!(
+            (low..=high).contains(&value),
+            "{name} is {value}, not in {low}..{high}"
+        );
     };
     // Kern & Koumoutsakos 2006; Borazjani & Sotiropoulos 2009; Carling et al. 1998.
     within("stride", figures.stride_body_lengths, 0.26, 0.55);
@@ -39,9 +42,16 @@ fn ten_vertebrae_swim_as_eels_do() {
     assert_eq!(summary.frames_lost, 0);
     assert_eq!((summary.boots, summary.emergencies), (10, 0));
     assert!(summary.stopped_in_order);
-    assert!(summary.bus_load_percent < 35.0, "{}", summary.bus_load_percent);
+    assert!(
+        summary.bus_load_percent < 35.0,
+        "{}",
+        summary.bus_load_percent
+    );
     for node in &summary.nodes {
-        assert!(node.peak_yaw_rad < std::f64::consts::FRAC_PI_6, "{node:?} left the workspace");
+        assert!(
+            node.peak_yaw_rad < std::f64::consts::FRAC_PI_6,
+            "{node:?} left the workspace"
+        );
         assert!(node.peak_torque_nm < 3.6, "{node:?}");
         assert!(node.max_tracking_error_rad < 0.15, "{node:?}");
     }

@@ -116,6 +116,18 @@ impl Bench {
         bench
     }
 
+    /// Leaves operation, where settings may be written.
+    pub fn maintain(&mut self) {
+        self.nmt(NmtCommand::EnterPreOperational);
+        self.run(2);
+    }
+
+    /// Returns to operation.
+    pub fn operate(&mut self) {
+        self.nmt(NmtCommand::Start);
+        self.run(20);
+    }
+
     /// Powers up and enables.
     pub fn running() -> Self {
         let mut bench = Self::ready();
