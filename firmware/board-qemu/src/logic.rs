@@ -19,7 +19,12 @@ mod image {
         let Some(node) = NodeId::new(black_box(1)) else {
             cortex_m::asm::udf();
         };
-        let mut vertebra = Vertebra::new(black_box(Settings::prototype(node, 1)), now);
+        let start = if black_box(false) {
+            Vertebra::after_failure
+        } else {
+            Vertebra::new
+        };
+        let mut vertebra = start(black_box(Settings::prototype(node, 1)), now);
         let (amplitude, wavelength) = black_box((800, 8_000));
         let Ok(gait) = Gait::new(
             black_box(1_000),

@@ -1,6 +1,9 @@
 //! Three H-bridges on TIM1, which the emergency stop line switches off without the CPU.
+//!
+//! What has forced the PWM low, be it the line or [`force_off`], stays until the vertebra has been told
+//! and has kept the bridges from driving for two ticks: by then no old duty is left in the timer.
 
-use eel_drivers::{Bridge, BridgeError, Output};
+use eel_drivers::{Bridge, BridgeError, Orientation, Output};
 use eel_vertebra::Drive;
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output as Pin, OutputType, Pull, Speed};
@@ -11,9 +14,6 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannel};
 use embassy_stm32::timer::{BkIn1, BreakInputPin};
-
-/// Whether a motor's positive torque needs its direction input low, as its gears are mounted.
-const REVERSED: [bool; 3] = [false, false, false];
 
 const PWM_FREQUENCY: Hertz = Hertz::khz(20);
 
@@ -38,16 +38,24 @@ type Motor = Bridge<SimplePwmChannel<'static, TIM1>, Pin<'static>, Pin<'static>>
 /// The bridges of the three motors, and the lines that report on them.
 pub struct Bridges {
     motors: [Motor; 3],
+    orientations: [Orientation; 3],
     faults: [Input<'static>; 3],
     stop: Flex<'static>,
+    /// Whether the vertebra was told of a stop in this tick.
+    is_stop_told: bool,
+    /// Whether no bridge drove in the tick before.
+    was_idle: bool,
 }
 
 impl Bridges {
-    /// Takes the connections; the bridges are off.
+    /// Takes the connections of motors that are built in like this; the bridges are off.
     ///
     /// # Errors
     /// None that these connections can have.
-    pub fn new(connections: Connections) -> Result<Self, BridgeError> {
+    pub fn new(
+        connections: Connections,
+        orientations: [Orientation; 3],
+    ) -> Result<Self, BridgeError> {
         let Connections {
             timer,
             pwm,
@@ -74,31 +82,59 @@ impl Bridges {
         });
         Ok(Self {
             motors: [
-                Bridge::new(one, low(direction.0), low(wake.0), REVERSED[0])?,
-                Bridge::new(two, low(direction.1), low(wake.1), REVERSED[1])?,
-                Bridge::new(three, low(direction.2), low(wake.2), REVERSED[2])?,
+                Bridge::new(one, low(direction.0), low(wake.0))?,
+                Bridge::new(two, low(direction.1), low(wake.1))?,
+                Bridge::new(three, low(direction.2), low(wake.2))?,
             ],
             faults: [
                 Input::new(fault.0, Pull::Up),
                 Input::new(fault.1, Pull::Up),
                 Input::new(fault.2, Pull::Up),
             ],
+            orientations,
             stop,
+            is_stop_told: false,
+            was_idle: false,
         })
     }
 
     /// Makes the bridges do this until the next tick.
     pub fn apply(&mut self, drives: [Drive; 3]) {
-        for (motor, drive) in self.motors.iter_mut().zip(drives) {
+        let built = self.motors.iter_mut().zip(self.orientations);
+        for ((motor, orientation), drive) in built.zip(drives) {
             let output = match drive {
                 Drive::Off => Output::Off,
                 Drive::Brake => Output::Brake,
                 Drive::Duty(duty) => Output::Duty(duty),
             };
-            if motor.apply(output).is_err() {
+            if motor.apply(orientation.output(output)).is_err() {
                 force_off();
             }
         }
+        let is_idle = !drives.iter().any(|drive| matches!(drive, Drive::Duty(_)));
+        if is_idle && self.was_idle {
+            self.restore_outputs();
+        }
+        self.was_idle = is_idle;
+    }
+
+    /// Lets the timer drive its outputs again, which have been idle since the tick before, unless the
+    /// stop line is asserted or was in a way that the vertebra does not know yet.
+    fn restore_outputs(&mut self) {
+        critical_section::with(|_| {
+            let has_stopped = pac::TIM1.sr().read().bif(0);
+            if self.stop.is_high() || (has_stopped && !self.is_stop_told) {
+                return;
+            }
+            if has_stopped {
+                // Only bits written as 0 are cleared.
+                pac::TIM1.sr().write(|flags| {
+                    flags.0 = u32::MAX;
+                    flags.set_bif(0, false);
+                });
+            }
+            pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(true));
+        });
     }
 
     /// Tells which bridges report a fault.
@@ -106,20 +142,12 @@ impl Bridges {
         self.faults.each_ref().map(Input::is_low)
     }
 
-    /// Tells whether the emergency stop line is or was asserted since the last call, and lets the
-    /// timer drive its outputs again where it no longer is. The vertebra has latched the stop then.
+    /// Tells whether the emergency stop line is asserted, or was since the timer last drove its
+    /// outputs. Changes nothing: [`apply`](Self::apply) ends the stop of the timer, once the vertebra
+    /// has latched its own.
     pub fn take_emergency_stop(&mut self) -> bool {
-        let is_asserted = self.stop.is_high();
-        let was_asserted = pac::TIM1.sr().read().bif(0);
-        if was_asserted && !is_asserted {
-            // Only bits written as 0 are cleared.
-            pac::TIM1.sr().write(|flags| {
-                flags.0 = u32::MAX;
-                flags.set_bif(0, false);
-            });
-            pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(true));
-        }
-        is_asserted || was_asserted
+        self.is_stop_told = self.stop.is_high() || pac::TIM1.sr().read().bif(0);
+        self.is_stop_told
     }
 }
 
@@ -128,11 +156,16 @@ fn low(pin: Peri<'static, impl embassy_stm32::gpio::Pin>) -> Pin<'static> {
     Pin::new(pin, Level::Low, Speed::Low)
 }
 
-/// Lets the emergency stop line force the PWM low, and the timer trigger the ADC once per period.
+/// Lets the emergency stop line, a CPU that is locked up, an error of the flash that can't be corrected
+/// and a crystal that stopped force the PWM low, and the timer trigger the ADC once per period.
 fn configure_break(pin: Peri<'static, PB12>) -> Flex<'static> {
     let function = BreakInputPin::<TIM1, BkIn1>::af_num(&*pin);
     let mut line = Flex::new(pin);
     line.set_as_af_unchecked(function, AfType::input(Pull::Up));
+    pac::SYSCFG.cfgr2().modify(|causes| {
+        causes.set_cll(true);
+        causes.set_eccl(true);
+    });
     pac::TIM1.bdtr().modify(|outputs| {
         outputs.set_ossr(Ossr::IDLE_LEVEL);
         outputs.set_ossi(Ossi::IDLE_LEVEL);
@@ -150,10 +183,12 @@ fn configure_break(pin: Peri<'static, PB12>) -> Flex<'static> {
 
 /// Switches all bridges off whatever state the program is in: PWM low, wake pins low.
 pub fn force_off() {
-    pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(false));
-    pac::GPIOC.bsrr().write(|pins| {
-        for wake in [8, 9, 10] {
-            pins.set_br(wake, true);
-        }
+    critical_section::with(|_| {
+        pac::TIM1.bdtr().modify(|outputs| outputs.set_moe(false));
+        pac::GPIOC.bsrr().write(|pins| {
+            for wake in [8, 9, 10] {
+                pins.set_br(wake, true);
+            }
+        });
     });
 }

@@ -1,6 +1,7 @@
 //! Clocks: 170 MHz for the core, 85 MHz for CAN, 42.5 MHz for the ADCs.
 
 use embassy_stm32::Config;
+use embassy_stm32::pac;
 use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllQDiv, PllRDiv, PllSource};
 use embassy_stm32::rcc::{Sysclk, mux};
 use embassy_stm32::time::Hertz;
@@ -26,4 +27,12 @@ pub fn configuration() -> Config {
     config.rcc.mux.fdcansel = mux::Fdcansel::PLL1_Q;
     config.rcc.mux.adc12sel = mux::Adcsel::SYS;
     config
+}
+
+/// Makes a crystal that stops a failure: the clock goes on inside the chip, the PWM goes low without
+/// the CPU, and the interrupt that nobody expects resets. A debugger that halts the core, too, stops
+/// the timer of the PWM and so its outputs.
+pub fn guard() {
+    pac::RCC.cr().modify(|clock| clock.set_csson(true));
+    pac::DBGMCU.apb2fzr().modify(|freeze| freeze.set_tim1(true));
 }

@@ -1,13 +1,21 @@
 //! The control tick: once per millisecond, one turn of the vertebra.
 
+use core::array::from_fn;
+
+use eel_drivers::Orientation;
 use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::{Event, Sample, Settings, Vertebra, turn};
 use embassy_time::{Duration, Instant, Ticker};
 
 use crate::bridges::{self, Bridges};
 use crate::currents::Currents;
+use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
 use crate::{bus, liveness};
+
+/// How the motors and their encoders are built in. The one table of signs: [`measure`] turns what
+/// comes from the sensors by it, [`Bridges::apply`] what goes to the bridges.
+const ORIENTATIONS: [Orientation; 3] = [Orientation::DIRECT; 3];
 
 /// Everything that the tick measures with and acts on.
 pub struct Hardware {
@@ -21,12 +29,12 @@ pub struct Hardware {
     pub cranks: CrankConnections,
 }
 
-/// Runs the vertebra.
+/// Runs the vertebra; after a failure it stays stopped until the head has sent a fault reset.
 #[embassy_executor::task]
-pub async fn run(hardware: Hardware, settings: Settings) {
+pub async fn run(hardware: Hardware, settings: Settings, start: Start) {
     let (crank_bus, select) = hardware.cranks.start();
     let cranks = Cranks::new(&crank_bus, select);
-    let bridges = Bridges::new(hardware.bridges);
+    let bridges = Bridges::new(hardware.bridges, ORIENTATIONS);
     let (Some(mut cranks), Ok(mut bridges)) = (cranks, bridges) else {
         // Can't happen with these pins; the watchdog starts anew.
         bridges::force_off();
@@ -41,7 +49,10 @@ pub async fn run(hardware: Hardware, settings: Settings) {
         currents.take();
         liveness::CONTROL.advance();
     }
-    let mut vertebra = Vertebra::new(settings, now());
+    let mut vertebra = match start {
+        Start::Ordered => Vertebra::new(settings, now()),
+        Start::Failed => Vertebra::after_failure(settings, now()),
+    };
     loop {
         ticker.next().await;
         let start = Instant::now();
@@ -73,14 +84,15 @@ fn measure(
     let measured = currents.take();
     let (board_temperature, motor_temperature) = temperatures();
     let faults = bridges.faults();
+    let (counts, angles) = (counters.read(), cranks.read());
     Sample {
-        encoder_counts: counters.read(),
-        absolute: cranks.read(),
-        current: measured.currents,
+        encoder_counts: from_fn(|motor| ORIENTATIONS[motor].count(counts[motor])),
+        absolute: from_fn(|motor| angles[motor].map(|angle| ORIENTATIONS[motor].angle(angle))),
+        current: from_fn(|motor| ORIENTATIONS[motor].current(measured.currents[motor])),
         supply: measured.supply,
         board_temperature,
         motor_temperature,
-        bridge_fault: core::array::from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
+        bridge_fault: from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
         emergency_stop: bridges.take_emergency_stop(),
     }
 }

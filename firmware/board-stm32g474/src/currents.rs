@@ -12,17 +12,22 @@ use embassy_stm32::peripherals::*;
 use embassy_stm32::triggers::TIM1_TRGO2;
 use embassy_stm32::{Peri, interrupt as handler};
 
-use crate::liveness;
+use crate::{bridges, liveness};
 
-/// µA per step of the ADC, times 1000: 3.3 V / 4096 over 10 mΩ · 50.
-const NANOAMPS_PER_STEP: i64 = 1_611_328;
+/// nA per step of the ADC: 3.3 V / 4096 over 5 mΩ · 50. The range is ±6.6 A: beyond 4.1 A, which the
+/// supply drives through a stalled motor, and 3.75 A, at which the vertebra sees an over-current.
+const NANOAMPS_PER_STEP: i64 = 3_222_656;
 /// mV at the end of the ADC's range: 3.3 V · 11.
 const SUPPLY_RANGE: u32 = 36_300;
 const STEPS: u32 = 4_096;
 /// Ticks over which the offsets are averaged after power-up.
 const OFFSET_TICKS: u32 = 256;
 /// How far an offset may lie from the middle of the range, in steps: 160 mA.
-const OFFSET_WINDOW: i64 = 100;
+const OFFSET_WINDOW: i64 = 50;
+/// How near a mean may come to an end of the range, in steps; nearer, no amplifier is at work.
+const RAIL: i64 = 16;
+/// Conversions without a control tick after which the bridges are switched off: 5 ms.
+const STALLED: u32 = 100;
 
 /// Sums of the conversions since they were last taken.
 #[derive(Clone, Copy)]
@@ -57,7 +62,8 @@ pub struct Measurement {
     pub currents: [Current; 3],
     /// Mean supply voltage.
     pub supply: Voltage,
-    /// Whether a channel's offset is out of its window, or there is nothing to average.
+    /// Whether a channel's offset is out of its window or its mean at an end of the range, there is
+    /// nothing to average, or the control tick came so late that the bridges were switched off.
     pub is_faulty: [bool; 3],
 }
 
@@ -132,7 +138,9 @@ impl Currents {
                 (sum * zeros - zero * count) * NANOAMPS_PER_STEP / (1_000 * count * zeros);
             let middle = i64::from(STEPS / 2);
             measurement.currents[motor] = Current::from_microamps(microamps as i32);
-            measurement.is_faulty[motor] = (zero / zeros - middle).abs() > OFFSET_WINDOW;
+            let has_offset = (zero / zeros - middle).abs() <= OFFSET_WINDOW;
+            let is_in_range = (RAIL..i64::from(STEPS) - RAIL).contains(&(sum / count));
+            measurement.is_faulty[motor] = !has_offset || !is_in_range || sums.count >= STALLED;
         }
         measurement
     }
@@ -153,6 +161,10 @@ fn ADC1_2() {
         }
         sums.count = sums.count.wrapping_add(1);
         cell.set(sums);
+        // Nobody controls the currents any more; the watchdog needs ten times as long.
+        if sums.count == STALLED {
+            bridges::force_off();
+        }
     });
     liveness::CURRENT.advance();
 }

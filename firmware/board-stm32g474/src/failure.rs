@@ -1,24 +1,37 @@
-//! What happens when the program fails: bridges off, a note for the next start, reset.
+//! What happens when the program fails: bridges off, a note for the next start, reset; and how the
+//! next start tells a failure from a start that was ordered.
 
 use core::cell::UnsafeCell;
 use core::panic::PanicInfo;
 use core::ptr;
 
 use cortex_m_rt::{ExceptionFrame, exception};
+use embassy_stm32::pac;
 
 use crate::bridges;
 
 const MAGIC: u32 = 0x0EE1_DEAD;
 
+/// What led to this start.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// Power, the reset pin, or option bytes that were written.
+    Ordered,
+    /// The program or its clock failed: a watchdog, a panic, a fault of the CPU, an interrupt that
+    /// nobody expects, a software reset. A programmer that starts the chip by a software reset counts
+    /// too, as it can't be told from the others.
+    Failed,
+}
+
 /// Where a program failed: a line of the source, or an address for a fault of the CPU.
 #[derive(Clone, Copy)]
-pub struct Note {
+struct Note {
     magic: u32,
     /// Line of the panic; 0 for a fault of the CPU.
-    pub line: u32,
+    line: u32,
     /// Address of the instruction that faulted, or the number of an interrupt that nobody expects;
     /// 0 for a panic.
-    pub address: u32,
+    address: u32,
 }
 
 /// Memory that start-up leaves alone.
@@ -34,8 +47,36 @@ static KEPT: Kept = Kept(UnsafeCell::new(Note {
     address: 0,
 }));
 
+/// Finds out and logs what led to this start, and clears the signs of it.
+///
+/// A failure is never missed for another cause: its flag or note stays until it is read here, and
+/// outweighs the reset pin, which every reset of the chip also moves.
+pub fn take_start() -> Start {
+    let note = take_note();
+    if let Some(note) = note {
+        defmt::error!(
+            "failed before: line {=u32}, address {=u32:#010x}",
+            note.line,
+            note.address
+        );
+    }
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|flags| flags.set_rmvf(true));
+    let by_watchdog = flags.iwdgrstf() || flags.wwdgrstf();
+    if by_watchdog {
+        defmt::error!("reset by the watchdog");
+    }
+    // The last is a stop mode that the program never asks for.
+    let failed = note.is_some() || by_watchdog || flags.sftrstf() || flags.lpwrrstf();
+    if failed {
+        Start::Failed
+    } else {
+        Start::Ordered
+    }
+}
+
 /// Returns the note of a failure before this start, and forgets it.
-pub fn take_note() -> Option<Note> {
+fn take_note() -> Option<Note> {
     // SAFETY: any bits are a valid `Note`, and nothing else runs yet.
     let note = unsafe { ptr::read_volatile(KEPT.0.get()) };
     keep(0, 0, 0);

@@ -8,7 +8,7 @@ use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::peripherals::*;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, Peripherals, interrupt as handler, pac, uid};
+use embassy_stm32::{Peri, Peripherals, interrupt as handler, uid};
 
 use crate::sensors::{CounterConnections, CrankConnections, ThermistorConnections, Thermistors};
 use crate::{bridges, bus, clocks, control, currents, failure, slow};
@@ -41,16 +41,17 @@ unsafe fn LPUART1() {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     bridges::force_off();
+    let cause = failure::take_start();
     let peripherals = embassy_stm32::init(clocks::configuration());
-    report_reset();
-    start(peripherals);
+    clocks::guard();
+    start(peripherals, cause);
     loop {
         cortex_m::asm::wfi();
     }
 }
 
 /// Starts every task; without a node number none, and the bridges stay off.
-fn start(p: Peripherals) {
+fn start(p: Peripherals, cause: failure::Start) {
     let Some(node) = read_node(p.PA2, p.PA3, p.PB9, p.PB11) else {
         defmt::error!("the switches show no node number from 1 to 10");
         return;
@@ -108,8 +109,10 @@ fn start(p: Peripherals) {
             select: (p.PB13, p.PB14, p.PB15),
         },
     };
-    spawn(&control, control::run(hardware, settings));
-    let watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    // From here on, so that no task can hang unseen before the one that feeds it has begun.
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+    spawn(&control, control::run(hardware, settings, cause));
     spawn(&slow, slow::run(thermistors, watchdog));
 }
 
@@ -150,20 +153,4 @@ fn serial() -> u32 {
         .chunks_exact(4)
         .filter_map(|word| word.try_into().ok().map(u32::from_le_bytes))
         .fold(0, |serial, word| serial.rotate_left(7) ^ word)
-}
-
-/// Logs what ended the run before.
-fn report_reset() {
-    if let Some(note) = failure::take_note() {
-        defmt::error!(
-            "failed before: line {=u32}, address {=u32:#010x}",
-            note.line,
-            note.address
-        );
-    }
-    let cause = pac::RCC.csr().read();
-    if cause.iwdgrstf() {
-        defmt::error!("reset by the watchdog");
-    }
-    pac::RCC.csr().modify(|flags| flags.set_rmvf(true));
 }

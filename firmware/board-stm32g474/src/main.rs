@@ -1,29 +1,38 @@
 //! The flashable image of a vertebra for the STM32G474RE, LQFP64.
 //!
 //! It gives [`eel_vertebra::Vertebra`] a clock, a bus, sensors and bridges, and decides nothing
-//! itself. Two executors run in interrupts: the bus above the control tick, so that no frame waits
-//! for a turn, and everything slow below both. The main thread sleeps.
+//! itself. Three executors run in interrupts: the bus's above the control tick's, so that no frame
+//! waits for a turn, and that of everything slow below both. The main thread sleeps.
 //!
 //! | function | pins | parts assumed on the board |
 //! |---|---|---|
 //! | CAN | PA11 FDCAN1_RX, PA12 FDCAN1_TX | 5 V transceiver, 3.3 V logic |
 //! | bridge PWM, motors 1–3 | PA8, PA9, PA10: TIM1_CH1–3 | DRV8874, PMODE low; pull-down |
-//! | bridge direction | PB0, PB1, PB10 | |
+//! | bridge direction | PB0, PB1, PB10 | PHASE |
+//! | bridge current, no pin | VREF on 3.3 V, IPROPI over 2.94 kΩ to ground, IMODE to ground | chops at 2.5 A, see below |
 //! | bridge wake | PC8, PC9, PC10 | nSLEEP, pulled down in the DRV8874 |
 //! | bridge fault | PC11, PC12, PD2, low when faulty | nFAULT, open drain |
 //! | emergency stop | PB12 TIM1_BKIN, high when stopped | loop to ground; a broken loop stops |
 //! | motor encoders | PA0/PA1 TIM2, PC6/PC7 TIM3, PB6/PB7 TIM4 | quadrature, 512 lines |
 //! | crank encoders | PA5 SCK, PA6 MISO, PA7 MOSI: SPI1; PB13, PB14, PB15 select | AS5047P, zero in ZPOS |
-//! | motor currents | PC0, PC1, PC2: ADC1_IN6–8 | 10 mΩ in line, INA240A2, half of VDDA at 0 A |
+//! | motor currents | PC0, PC1, PC2: ADC1_IN6–8 | 5 mΩ in line, INA240A2, half of VDDA at 0 A |
 //! | supply | PC3: ADC1_IN9 | 100 kΩ over 10 kΩ |
 //! | temperatures | PA4 board, PC4, PC5, PB2 motors: ADC2 | thermistors, see eel-drivers |
 //! | node number | PA2, PA3, PB9, PB11: 1, 2, 4, 8 | switches to ground; 1–10 |
 //! | crystal | PF0, PF1 | 24 MHz |
 //! | debugging | PA13, PA14 | SWD, RTT |
 //!
+//! The bridges bound the motor current by themselves, whatever the program does: a DRV8874 ends its
+//! drive when the voltage at IPROPI, 450 µA/A into 2.94 kΩ, reaches VREF: 3.3 V / (450 µA/A · 2.94 kΩ)
+//! = 2.5 A, the prototype's limit. Other motors need another resistor at IPROPI, to 1 %, as well as
+//! another limit in the settings; without the resistor (IPROPI to ground) there is no such bound.
+//!
 //! The break input of TIM1 forces all PWM low without the CPU, which brakes the motors; the next
-//! control tick puts the bridges to sleep. Reset, a panic, a fault of the CPU and the watchdog leave
-//! the wake pins low: the motors are free.
+//! control tick puts the bridges to sleep. A stopped crystal, a locked-up CPU and a flash error do the
+//! same inside the chip. A control tick that is 5 ms late finds the bridges switched off by the 20 kHz
+//! interrupt, and a fault. Reset, a panic, a fault of the CPU and the watchdog leave the wake pins low:
+//! the motors are free; after each but the power's and the reset pin's reset the vertebra is stopped
+//! until the head has sent a fault reset. So it is when a programmer has started the image.
 //!
 //! What is shown here by tests: that the image links with the pins' alternate functions as the HAL
 //! knows them, and, in QEMU and on the host, the drivers and the logic. What only a board can show,

@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicI32, Ordering};
 
-use eel_drivers::{AbsoluteEncoder, Mounting, WideCounter, thermistor};
+use eel_drivers::{AbsoluteEncoder, WideCounter, thermistor};
 use eel_units::{Angle, Temperature};
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcConfig, SampleTime};
@@ -16,12 +16,9 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::qei::{self, Qei};
 use embedded_hal_bus::spi::{NoDelay, RefCellDevice};
 
-/// Which way each crank encoder is mounted.
-const MOUNTINGS: [Mounting; 3] = [Mounting::Direct; 3];
-
 /// Temperatures in tenths of a degree: the board, then the motors. Written slowly, read each tick;
-/// until the first writing they are those of a workshop.
-static TEMPERATURES: [AtomicI32; 4] = [const { AtomicI32::new(250) }; 4];
+/// until the first writing they are 150 °C, which keeps the motors off.
+static TEMPERATURES: [AtomicI32; 4] = [const { AtomicI32::new(1_500) }; 4];
 
 /// What the motor encoders are connected to.
 pub struct CounterConnections {
@@ -114,12 +111,11 @@ impl<'bus> Cranks<'bus> {
     /// Makes the encoders of a bus; `None` where a pin can't be set, which these pins always can.
     pub fn new(bus: &'bus CrankBus, select: [Output<'static>; 3]) -> Option<Self> {
         let [one, two, three] = select.map(|select| RefCellDevice::new_no_delay(bus, select).ok());
-        let [first, second, third] = MOUNTINGS;
         Some(Self {
             encoders: [
-                AbsoluteEncoder::new(one?, first),
-                AbsoluteEncoder::new(two?, second),
-                AbsoluteEncoder::new(three?, third),
+                AbsoluteEncoder::new(one?),
+                AbsoluteEncoder::new(two?),
+                AbsoluteEncoder::new(three?),
             ],
         })
     }

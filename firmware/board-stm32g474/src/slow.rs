@@ -12,12 +12,12 @@ const PERIOD: Duration = Duration::from_millis(10);
 /// Looks between two measurements of the temperatures.
 const LOOKS: u32 = 10;
 
-/// Measures temperatures at 10 Hz, and feeds the watchdog when every task has moved in 10 ms.
+/// Measures temperatures at 10 Hz, and feeds the watchdog when every task has moved in 10 ms; it runs
+/// already.
 #[embassy_executor::task]
 pub async fn run(mut thermistors: Thermistors, mut watchdog: IndependentWatchdog<'static, IWDG>) {
     let mut watch = Watch::default();
     let mut ticker = Ticker::every(PERIOD);
-    watchdog.unleash();
     loop {
         thermistors.measure();
         for _ in 0..LOOKS {

@@ -15,7 +15,7 @@ pub enum Output {
     Off,
     /// Low sides on: the motor is shorted.
     Brake,
-    /// This share of the supply voltage, positive with positive torque.
+    /// This share of the supply voltage, positive with the direction input high.
     Duty(Duty),
 }
 
@@ -36,7 +36,6 @@ pub struct Bridge<Pwm, Direction, Wake> {
     pwm: Pwm,
     direction: Direction,
     wake: Wake,
-    is_reversed: bool,
 }
 
 impl<Pwm, Direction, Wake> Bridge<Pwm, Direction, Wake>
@@ -45,22 +44,15 @@ where
     Direction: OutputPin,
     Wake: OutputPin,
 {
-    /// Takes the connections of a bridge and turns it off. With `is_reversed`, the direction input
-    /// is high for negative torque: the motor's leads or its gear turn the other way.
+    /// Takes the connections of a bridge and turns it off.
     ///
     /// # Errors
     /// The connection that could not be set.
-    pub fn new(
-        pwm: Pwm,
-        direction: Direction,
-        wake: Wake,
-        is_reversed: bool,
-    ) -> Result<Self, BridgeError> {
+    pub fn new(pwm: Pwm, direction: Direction, wake: Wake) -> Result<Self, BridgeError> {
         let mut bridge = Self {
             pwm,
             direction,
             wake,
-            is_reversed,
         };
         bridge.apply(Output::Off)?;
         Ok(bridge)
@@ -85,7 +77,7 @@ where
             Output::Duty(duty) => {
                 let is_positive = duty >= Duty::ZERO;
                 self.direction
-                    .set_state((is_positive != self.is_reversed).into())
+                    .set_state(is_positive.into())
                     .map_err(|_| BridgeError::Direction)?;
                 self.set_magnitude(duty.to_q15().unsigned_abs())?;
                 self.wake.set_high().map_err(|_| BridgeError::Wake)
@@ -113,7 +105,7 @@ mod tests {
     const MAX: u16 = 4_250;
 
     /// Applies an output to a bridge that was just made, and checks every write to its inputs.
-    fn check(reversed: bool, output: Output, cycle: u16, direction: Option<State>, awake: State) {
+    fn check(output: Output, cycle: u16, direction: Option<State>, awake: State) {
         let writes = [
             Cycle::max_duty_cycle(MAX),
             Cycle::set_duty_cycle(0),
@@ -124,8 +116,7 @@ mod tests {
         let direction: Option<Level> = direction.map(Level::set);
         let mut direction = Pin::new(direction.iter());
         let mut wake = Pin::new(&[Level::set(State::Low), Level::set(awake)]);
-        let mut bridge =
-            Bridge::new(pwm.clone(), direction.clone(), wake.clone(), reversed).unwrap();
+        let mut bridge = Bridge::new(pwm.clone(), direction.clone(), wake.clone()).unwrap();
         bridge.apply(output).unwrap();
         pwm.done();
         direction.done();
@@ -134,65 +125,31 @@ mod tests {
 
     #[test]
     fn sleeps_when_off() {
-        check(false, Output::Off, 0, None, State::Low);
+        check(Output::Off, 0, None, State::Low);
     }
 
     #[test]
     fn shorts_the_motor_when_braking() {
-        check(false, Output::Brake, 0, None, State::High);
+        check(Output::Brake, 0, None, State::High);
     }
 
     #[test]
     fn drives_with_sign_and_magnitude() {
         let half = Duty::from_q15(16_384);
-        check(
-            false,
-            Output::Duty(half),
-            2_125,
-            Some(State::High),
-            State::High,
-        );
-        check(
-            false,
-            Output::Duty(-half),
-            2_125,
-            Some(State::Low),
-            State::High,
-        );
-        check(
-            true,
-            Output::Duty(half),
-            2_125,
-            Some(State::Low),
-            State::High,
-        );
-        check(
-            true,
-            Output::Duty(-half),
-            2_125,
-            Some(State::High),
-            State::High,
-        );
+        check(Output::Duty(half), 2_125, Some(State::High), State::High);
+        check(Output::Duty(-half), 2_125, Some(State::Low), State::High);
     }
 
     #[test]
     fn never_asks_for_more_than_full_voltage() {
         check(
-            false,
             Output::Duty(Duty::FULL),
             MAX,
             Some(State::High),
             State::High,
         );
+        check(Output::Duty(Duty::MAX), MAX, Some(State::High), State::High);
         check(
-            false,
-            Output::Duty(Duty::MAX),
-            MAX,
-            Some(State::High),
-            State::High,
-        );
-        check(
-            false,
             Output::Duty(Duty::from_q15(i32::MIN)),
             MAX,
             Some(State::Low),

@@ -34,29 +34,18 @@ pub enum EncoderError {
     Magnet,
 }
 
-/// Which way the encoder counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mounting {
-    /// Up with the crank's positive sense.
-    Direct,
-    /// Down with it.
-    Reversed,
-}
-
 /// One encoder, whose zero is programmed to the crank's.
 #[derive(Debug)]
 pub struct AbsoluteEncoder<Spi> {
     spi: Spi,
-    mounting: Mounting,
     has_asked: bool,
 }
 
 impl<Spi: SpiDevice> AbsoluteEncoder<Spi> {
     /// Takes an encoder's connection, SPI mode 1 at 10 MHz or less; the first reading is not ready.
-    pub const fn new(spi: Spi, mounting: Mounting) -> Self {
+    pub const fn new(spi: Spi) -> Self {
         Self {
             spi,
-            mounting,
             has_asked: false,
         }
     }
@@ -81,12 +70,7 @@ impl<Spi: SpiDevice> AbsoluteEncoder<Spi> {
         if diagnostics & (MAGNET_TOO_WEAK | MAGNET_TOO_STRONG | OVERFLOW) != 0 {
             return Err(EncoderError::Magnet);
         }
-        let angle = to_angle(angle);
-        Ok(if self.mounting == Mounting::Reversed {
-            -angle
-        } else {
-            angle
-        })
+        Ok(to_angle(angle))
     }
 
     /// Sends a word and returns the answer to the word before.
@@ -137,7 +121,7 @@ mod tests {
     }
 
     /// Reads as often as there are pairs of answers: diagnostics, angle.
-    fn read_all(answers: &[(u16, u16)], mounting: Mounting) -> Result<Angle, EncoderError> {
+    fn read_all(answers: &[(u16, u16)]) -> Result<Angle, EncoderError> {
         let mut expected = std::vec::Vec::new();
         for &(diagnostics, angle) in answers {
             for (word, answer) in [(0xFFFF, diagnostics), (0xFFFC, angle)] {
@@ -151,7 +135,7 @@ mod tests {
             }
         }
         let mut spi = Spi::new(&expected);
-        let mut encoder = AbsoluteEncoder::new(spi.clone(), mounting);
+        let mut encoder = AbsoluteEncoder::new(spi.clone());
         let mut last = Err(EncoderError::Bus);
         for _ in answers {
             last = encoder.read();
@@ -162,7 +146,7 @@ mod tests {
 
     /// Reads twice, the second time with these answers.
     fn read(diagnostics: u16, angle: u16) -> Result<Angle, EncoderError> {
-        read_all(&[(0, 0), (diagnostics, angle)], Mounting::Direct)
+        read_all(&[(0, 0), (diagnostics, angle)])
     }
 
     #[test]
@@ -186,18 +170,14 @@ mod tests {
     }
 
     #[test]
-    fn counts_the_other_way_when_reversed() {
-        let quarter = with_parity(1 << 12);
-        let answers = [(0, 0), (HEALTHY, quarter)];
-        let direct = read_all(&answers, Mounting::Direct).unwrap();
-        let reversed = read_all(&answers, Mounting::Reversed).unwrap();
-        assert!((direct - Angle::FRAC_PI_2).abs() <= Angle::from_q29(1));
-        assert_eq!(reversed, -direct);
+    fn reads_a_quarter_of_a_turn() {
+        let angle = read(HEALTHY, with_parity(1 << 12)).unwrap();
+        assert!((angle - Angle::FRAC_PI_2).abs() <= Angle::from_q29(1));
     }
 
     #[test]
     fn gives_no_angle_before_diagnostics_were_asked_for() {
-        let first = read_all(&[(HEALTHY, HEALTHY)], Mounting::Direct);
+        let first = read_all(&[(HEALTHY, HEALTHY)]);
         assert_eq!(first, Err(EncoderError::NotReady));
     }
 

@@ -8,12 +8,16 @@
 #[cfg(test)]
 extern crate std;
 
+mod backoff;
 mod bridge;
 mod counter;
 mod encoder;
+mod orientation;
 mod thermistor;
 
+pub use backoff::Backoff;
 pub use bridge::{Bridge, BridgeError, Output};
 pub use counter::WideCounter;
-pub use encoder::{AbsoluteEncoder, EncoderError, Mounting};
+pub use encoder::{AbsoluteEncoder, EncoderError};
+pub use orientation::{Mounting, Orientation};
 pub use thermistor::thermistor;
