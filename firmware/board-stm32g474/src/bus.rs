@@ -1,8 +1,15 @@
 //! The CAN bus: FDCAN1 at 1 Mbit/s, only the identifiers that concern this vertebra.
+//!
+//! Frames leave in the order in which they were made, or not at all: when the bus takes none for 20 ms,
+//! or is off, everything that waits is dropped and counted, here and in the controller, so that what is
+//! sent afterwards is of its time. The controller does not rejoin by itself after a bus-off but after
+//! a pause, which grows while it happens again ([`Backoff`]). The first pause is longer than the time
+//! without targets after which the vertebra stops.
 
 use core::num::{NonZeroU8, NonZeroU16};
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use eel_drivers::Backoff;
 use eel_protocol::{Cob, Frame, HEAD_NODE, NodeId};
 use embassy_futures::select::{Either, select};
 use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming, TxBufferMode};
@@ -11,10 +18,10 @@ use embassy_stm32::can::frame::Header;
 use embassy_stm32::can::{Can, CanConfigurator, CanRx, CanTx, Frame as HalFrame};
 use embassy_stm32::can::{IT0InterruptHandler, IT1InterruptHandler};
 use embassy_stm32::peripherals::*;
-use embassy_stm32::{Peri, bind_interrupts};
+use embassy_stm32::{Peri, bind_interrupts, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_time::Timer;
+use embassy_time::{Instant, Timer};
 
 use crate::liveness;
 
@@ -24,6 +31,9 @@ pub const QUEUE: usize = 32;
 const PULSE_MS: u64 = 5;
 /// Signs of life for which a frame waits for the bus before it is dropped: 20 ms, two SYNCs.
 const PATIENCE: u32 = 4;
+
+/// Reads of a register after which a bit that was written must show.
+const SETTLING: u32 = 1_000;
 
 /// 85 MHz / 85 = 1 Mbit/s, sampled at 87 %.
 const BIT_TIMING: NominalBitTiming = NominalBitTiming {
@@ -42,6 +52,8 @@ bind_interrupts!(struct Interrupts {
 pub static RECEIVED: Channel<CriticalSectionRawMutex, Frame, QUEUE> = Channel::new();
 /// Frames for the bus.
 pub static TO_SEND: Channel<CriticalSectionRawMutex, Frame, QUEUE> = Channel::new();
+/// How often the bus went off.
+static BUS_OFFS: AtomicU32 = AtomicU32::new(0);
 static RECEIVE_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 static TRANSMIT_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
@@ -70,13 +82,14 @@ pub fn start(connections: Connections, node: NodeId) -> Can<'static> {
         // In priority mode frames with one identifier can overtake each other, as a new one takes the
         // lowest free buffer: segments of an SDO transfer and emergencies would change places.
         .set_tx_buffer_mode(TxBufferMode::Fifo)
-        .set_automatic_bus_off_recovery(true);
+        .set_automatic_bus_off_recovery(false);
     bus.set_config(config);
     bus.properties().set_standard_filters(&filters(node));
     bus.into_normal_mode()
 }
 
-/// Lists what this vertebra hears; everything else stays in the controller.
+/// Lists what this vertebra hears, which is what its node acts on and what the simulator's vertebrae
+/// hear; the controller drops everything else.
 fn filters(node: NodeId) -> [StandardFilter; 28] {
     let exact = |cob: Cob| Filter {
         filter: FilterType::BitMask {
@@ -90,14 +103,10 @@ fn filters(node: NodeId) -> [StandardFilter; 28] {
     let heard = [
         Cob::Nmt,
         Cob::Sync,
-        Cob::Time,
         Cob::Target(node),
         Cob::Moment(node),
         Cob::SdoRequest(node),
         Cob::Heartbeat(HEAD_NODE),
-        Cob::LssRequest,
-        // Its own, which no other node may send.
-        Cob::Heartbeat(node),
     ];
     for (slot, cob) in filters.iter_mut().zip(heard) {
         *slot = exact(cob);
@@ -105,7 +114,7 @@ fn filters(node: NodeId) -> [StandardFilter; 28] {
     filters
 }
 
-/// Counts a frame that found no room.
+/// Counts a frame that is lost.
 fn count(overruns: &AtomicU32) {
     overruns.fetch_add(1, Ordering::Relaxed);
 }
@@ -139,33 +148,120 @@ pub async fn receive(mut bus: CanRx<'static>) {
             Either::First(Err(_)) => Timer::after_millis(1).await,
             Either::Second(()) => {}
         }
+        if pac::FDCAN1.ir().read().rfl(0) {
+            // Cleared by writing 1, and only this one. Frames, of which it doesn't say how many, found
+            // no room in the controller.
+            pac::FDCAN1.ir().write(|flags| flags.set_rfl(0, true));
+            count(&RECEIVE_OVERRUNS);
+        }
         liveness::RECEIVE.advance();
+    }
+}
+
+/// Where the controller stands on its bus.
+enum Standing {
+    /// It takes part.
+    On,
+    /// It was thrown off, and stays so.
+    Off,
+    /// It waits for the bus to be idle often enough.
+    Rejoining,
+}
+
+/// Tells where the controller stands.
+fn standing() -> Standing {
+    let is_off = pac::FDCAN1.psr().read().bo();
+    match (is_off, pac::FDCAN1.cccr().read().init()) {
+        (false, _) => Standing::On,
+        (true, true) => Standing::Off,
+        (true, false) => Standing::Rejoining,
     }
 }
 
 /// Brings frames from the control tick to the controller, which sends them in their order.
 #[embassy_executor::task]
 pub async fn transmit(mut bus: CanTx<'static>) {
+    let mut backoff = Backoff::default();
     loop {
         liveness::TRANSMIT.advance();
-        let next = select(TO_SEND.receive(), Timer::after_millis(PULSE_MS)).await;
-        let Either::First(frame) = next else { continue };
-        let Some(waiting) = to_hal(&frame) else {
-            continue;
-        };
-        let mut patience = PATIENCE;
-        while patience > 0 {
-            liveness::TRANSMIT.advance();
-            match select(bus.write(&waiting), Timer::after_millis(PULSE_MS)).await {
-                // A FIFO never gives a frame back.
-                Either::First(_) => break,
-                Either::Second(()) => patience -= 1,
+        match standing() {
+            Standing::On => forward(&mut bus).await,
+            Standing::Off => stay_away(&mut backoff).await,
+            Standing::Rejoining => {
+                drop_waiting();
+                Timer::after_millis(PULSE_MS).await;
             }
         }
-        if patience == 0 {
-            count(&TRANSMIT_OVERRUNS);
+    }
+}
+
+/// Hands the next frame to the controller, if there is one soon.
+async fn forward(bus: &mut CanTx<'static>) {
+    let next = select(TO_SEND.receive(), Timer::after_millis(PULSE_MS)).await;
+    let Either::First(frame) = next else { return };
+    let Some(waiting) = to_hal(&frame) else {
+        return;
+    };
+    for _ in 0..PATIENCE {
+        liveness::TRANSMIT.advance();
+        let written = select(bus.write(&waiting), Timer::after_millis(PULSE_MS)).await;
+        // A FIFO never gives a frame back.
+        if let Either::First(_) = written {
+            return;
         }
     }
+    count(&TRANSMIT_OVERRUNS);
+    drop_waiting();
+    if let Standing::On = standing() {
+        leave();
+        join();
+    }
+}
+
+/// Stays off the bus for a while after a bus-off, and begins to rejoin.
+async fn stay_away(backoff: &mut Backoff) {
+    let now = eel_units::Instant::from_micros(Instant::now().as_micros());
+    let pause = u64::from(backoff.pause(now).to_micros() / 1_000);
+    let offs = BUS_OFFS.fetch_add(1, Ordering::Relaxed).wrapping_add(1);
+    defmt::warn!("bus-off number {=u32}, {=u64} ms away", offs, pause);
+    leave();
+    for _ in 0..pause / PULSE_MS {
+        drop_waiting();
+        liveness::TRANSMIT.advance();
+        Timer::after_millis(PULSE_MS).await;
+    }
+    join();
+}
+
+/// Drops and counts the frames that wait for the controller.
+fn drop_waiting() {
+    while TO_SEND.try_receive().is_ok() {
+        count(&TRANSMIT_OVERRUNS);
+    }
+}
+
+/// Takes the controller off the bus, counts the frames that it still had to send and makes it forget
+/// them. It does so when CCE is set, which resets TXBRP, TXFQS and the fill levels of reception
+/// (RM0440, FDCAN, software initialization); cancelling single frames is not meant for a FIFO.
+fn leave() {
+    let unsent = pac::FDCAN1.txbrp().read().0.count_ones();
+    TRANSMIT_OVERRUNS.fetch_add(unsent, Ordering::Relaxed);
+    pac::FDCAN1.cccr().modify(|control| control.set_init(true));
+    // Takes some cycles of the controller's clock to cross over to it and back.
+    for _ in 0..SETTLING {
+        if pac::FDCAN1.cccr().read().init() {
+            break;
+        }
+    }
+    pac::FDCAN1.cccr().modify(|control| control.set_cce(true));
+}
+
+/// Lets the controller take part again, after 11 idle bits or, after a bus-off, 129 times as many.
+fn join() {
+    pac::FDCAN1.cccr().modify(|control| {
+        control.set_cce(false);
+        control.set_init(false);
+    });
 }
 
 fn from_hal(frame: &HalFrame) -> Option<Frame> {
