@@ -63,7 +63,8 @@ struct SwimArgs {
     /// Simulated time of swimming, s; the orderly stop comes on top [0.1 to 3600]
     #[arg(long, default_value_t = 20.0, value_parser = between(0.1, 3600.0))]
     seconds: f64,
-    /// Cycles of the body wave a second, Hz [0.05 to 3]
+    /// Cycles of the body wave a second, Hz [0.05 to 3]; above about 1.4 at the default amplitude
+    /// the motors can no longer follow
     #[arg(long, default_value_t = 1.0, value_parser = between(0.05, 3.0))]
     frequency: f64,
     /// Amplitude of the tail edge, body lengths [0 to 0.2]; above about 0.09 the last vertebrae

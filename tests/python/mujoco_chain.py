@@ -6,7 +6,7 @@ and a rate, lets the chain fly for 2 s without gravity, and writes where nose, j
 edge then are. `--check FILE` compares with a stored table instead.
 
     pip install mujoco numpy
-    python tests/python/mujoco_chain.py > tests/golden/mujoco-chain.csv
+    python tests/python/mujoco_chain.py > hil-sim/src/plant/mujoco-chain.csv
 """
 
 import argparse

@@ -1,6 +1,6 @@
 //! Golden vectors of the wrist, made apart from this project: 64 poses per architecture.
 //!
-//! `data/wrist-*.csv` are never edited. The model in double precision must give them to 1e-12, the
+//! `golden/wrist-*.csv` are never edited. The model in double precision must give them to 1e-12, the
 //! firmware's kernel within its stated errors.
 
 use eel_kinematics::design::{self, Geometry, Vector3};
@@ -78,7 +78,7 @@ fn model_gives(geometry: &Geometry, text: &str) {
 fn the_model_gives_the_golden_vectors_of_parallel_axes() {
     model_gives(
         &Geometry::PARALLEL_AXES,
-        include_str!("../data/wrist-parallel-axes.csv"),
+        include_str!("../golden/wrist-parallel-axes.csv"),
     );
 }
 
@@ -86,7 +86,7 @@ fn the_model_gives_the_golden_vectors_of_parallel_axes() {
 fn the_model_gives_the_golden_vectors_of_orthogonal_axes() {
     model_gives(
         &Geometry::ORTHOGONAL_AXES,
-        include_str!("../data/wrist-orthogonal-axes.csv"),
+        include_str!("../golden/wrist-orthogonal-axes.csv"),
     );
 }
 
@@ -94,7 +94,7 @@ fn the_model_gives_the_golden_vectors_of_orthogonal_axes() {
 fn the_model_gives_the_golden_vectors_of_parallel_actuators() {
     model_gives(
         &Geometry::PARALLEL_ACTUATORS,
-        include_str!("../data/wrist-parallel-actuators.csv"),
+        include_str!("../golden/wrist-parallel-actuators.csv"),
     );
 }
 
@@ -104,7 +104,7 @@ fn the_kernel_gives_the_golden_vectors_of_its_architecture() {
     const Q30: f64 = (1u64 << 30) as f64;
     let one = Torque::from_q24(1 << 24);
     let mut worst = [0.0f64; 4];
-    for line in lines(include_str!("../data/wrist-parallel-actuators.csv")) {
+    for line in lines(include_str!("../golden/wrist-parallel-actuators.csv")) {
         let [yaw, pitch, roll] = line.pose.map(|a| Angle::from_q29((a * Q29).round() as i32));
         let inverse = Wrist::PAPER.inverse(&Pose { yaw, pitch, roll }).unwrap();
         for k in 0..3 {

@@ -28,6 +28,8 @@ const SYNC_PERIODS: (Duration, Duration) = (Duration::from_millis(5), Duration::
 const HEARTBEAT_PERIOD: Duration = Duration::from_millis(HEAD_HEARTBEAT_MS as u32);
 /// How long "off" is sent before the nodes leave operation.
 const SWITCHED_OFF: Duration = Duration::from_millis(50);
+/// How long vertebrae may take to report that they are off.
+const LAST_WORD: Duration = Duration::from_millis(1_000);
 /// NMT commands (CiA 301, 7.2.8.3.1.1).
 const NMT_START: u8 = 1;
 const NMT_PRE_OPERATIONAL: u8 = 128;
@@ -224,13 +226,29 @@ impl Head {
             {
                 self.enter(now, Phase::SwitchingOff);
             }
-            Phase::SwitchingOff if elapsed >= SWITCHED_OFF => {
-                self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
-                self.events.push(Event::Stopped);
-                self.enter(now, Phase::Stopped);
+            Phase::SwitchingOff
+                if elapsed >= LAST_WORD || elapsed >= SWITCHED_OFF && self.none_is_driven() =>
+            {
+                self.end(now);
             }
             _ => {}
         }
+    }
+
+    /// Ends the nodes' operation, and tells which of them never reported to be off.
+    fn end(&mut self, now: Instant) {
+        for tracker in self.trackers.iter().filter(|tracker| is_driven(tracker)) {
+            self.events.push(Event::NotStopped(tracker.id()));
+        }
+        if self.none_is_driven() {
+            self.events.push(Event::Stopped);
+        }
+        self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
+        self.enter(now, Phase::Stopped);
+    }
+
+    fn none_is_driven(&self) -> bool {
+        !self.trackers.iter().any(is_driven)
     }
 
     fn enter(&mut self, now: Instant, phase: Phase) {
@@ -333,6 +351,12 @@ impl Head {
 fn following(due: Instant, period: Duration, now: Instant) -> Instant {
     let next = due + period;
     if next > now { next } else { now + period }
+}
+
+/// Tells whether a vertebra that is there last reported a state in which its motors are driven.
+fn is_driven(tracker: &Tracker) -> bool {
+    let status = tracker.status();
+    status.stage != Stage::Missing && status.state.is_driven()
 }
 
 /// Returns how far `now` is on a smooth step of `length_us` that began at `since`, in Q15.

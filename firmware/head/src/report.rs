@@ -21,8 +21,10 @@ pub enum Event {
     Emergency(NodeId, EmergencyReport),
     /// The gait began.
     GaitStarted,
-    /// Every vertebra is off and out of operation.
+    /// Every vertebra that is there reports its drives off, and all leave operation.
     Stopped,
+    /// A vertebra was told to switch off and still reports to be driven; all leave operation.
+    NotStopped(NodeId),
 }
 
 /// The head's events on their way to its owner.

@@ -79,6 +79,19 @@ nibble! {
 }
 
 impl State {
+    /// Tells whether a motor may carry current.
+    pub const fn is_driven(self) -> bool {
+        matches!(
+            self,
+            Self::Run
+                | Self::Hold
+                | Self::Damped
+                | Self::Brake
+                | Self::StopDamped
+                | Self::StopBrake
+        )
+    }
+
     /// Tells whether only a fault reset leads out of the state.
     pub const fn is_latched(self) -> bool {
         matches!(

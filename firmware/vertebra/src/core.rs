@@ -3,34 +3,27 @@
 use eel_canopen::EventQueue;
 use eel_kinematics::{Joints, Pose, PoseError};
 use eel_protocol::emergency::{Emergency, Severity, Source};
-use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, Mode, State, Status};
+use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
 use eel_units::{Angle, Instant, Torque};
 
-use crate::command::{BRIDGED_PERIODS, CommandStream, Received, TARGET_TIMEOUT};
+use crate::command::{CommandStream, TARGET_TIMEOUT};
 use crate::current::{CurrentState, Electrical, Reading};
 use crate::encoder::{Encoder, EncoderFault};
 use crate::events::{EVENTS, Event};
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
 use crate::limits::{MotorBounds, Situation, bounds};
-use crate::machine::{Machine, Outcome};
+use crate::machine::Machine;
 use crate::objects::{Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
 use crate::settings::Settings;
 use crate::spline::{Reference, Spline};
-use crate::workspace::{Limited, admit};
+use crate::workspace::Limited;
 
 /// Deviation from the reference that is worth a warning: 150 mrad.
 const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
 /// Deviation below which that warning ends: 100 mrad, so that noise doesn't repeat it.
 const FOLLOWING_END: Angle = Angle::from_milliradians(100);
-/// Conditions that a fault reset can't clear because the reset itself, or time, does.
-const CLEARED_BY_RESET: [Condition; 4] = [
-    Condition::Latched,
-    Condition::CommandLost,
-    Condition::Encoders,
-    Condition::NotOperational,
-];
 /// Conditions that are told as warnings while they hold.
 const WARNINGS: [Condition; 3] = [
     Condition::TargetLimited,
@@ -47,22 +40,22 @@ pub(crate) struct Core {
     pub now: Instant,
     pub operational: bool,
     pub encoders: [Encoder; 3],
-    currents: [CurrentState; 3],
+    pub currents: [CurrentState; 3],
     pub machine: Machine,
     pub stream: CommandStream,
-    spline: Spline,
-    hold: Pose,
+    pub spline: Spline,
+    pub hold: Pose,
     pub motion: Option<Motion>,
     pub pose: Pose,
     pub target: ReceivedTarget,
     pub feed_forward: FeedForward,
     pub received_feed: FeedForward,
     pub status: Status,
-    limited: Limited,
-    warned: bool,
+    pub limited: Limited,
+    pub warned: bool,
     pub over_current_ticks: [u8; 3],
     pub lost_ticks: u8,
-    feed_since: Instant,
+    pub feed_since: Instant,
     pub effort: Effort,
     pub achieved: [Torque; 3],
     pub unallocated: [Torque; 3],
@@ -200,14 +193,6 @@ impl Core {
         Ok(Motion { direct, omega })
     }
 
-    /// Lets the path go on, or come to rest, while SYNCs or targets are missing.
-    fn bridge_missing_targets(&mut self) {
-        if self.stream.sync_overdue(self.now) {
-            let missed = self.stream.begin_segment(self.now);
-            self.continue_path(missed);
-        }
-    }
-
     /// Takes what RPDO2 brought; it holds for as long as a target would.
     pub fn receive_feed_forward(&mut self) {
         self.feed_since = self.now;
@@ -237,134 +222,6 @@ impl Core {
         if self.warned && !holds && !self.machine.state().is_latched() {
             self.emit(Emergency::CLEARED, Source::WHOLE);
         }
-    }
-
-    /// Takes a SYNC; targets have been received just before.
-    pub fn synchronise(&mut self, now: Instant) {
-        self.timing.note_sync(now);
-        self.feed_forward = self.received_feed;
-        if !self.stream.is_fresh() {
-            self.mend_path();
-        }
-        if let Some(missed) = self.stream.synchronise(now) {
-            self.continue_path(missed);
-        }
-    }
-
-    /// Begins the next segment of the path after `missed` periods without a target.
-    fn continue_path(&mut self, missed: u8) {
-        let late = missed > BRIDGED_PERIODS && self.machine.state() == State::Run;
-        if late && !self.status.contains(Condition::CommandLate) {
-            self.emit(
-                Emergency::COMMAND_LATE,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail: u16::from(missed),
-                },
-            );
-        }
-        self.status = self.status.with(Condition::CommandLate, late);
-        if missed == 0 {
-            return;
-        }
-        let wanted = if missed <= BRIDGED_PERIODS {
-            self.spline.continued()
-        } else {
-            self.spline.newest()
-        };
-        self.follow(wanted);
-    }
-
-    /// Lets the path begin again where it is, so that a SYNC out of its rhythm makes no jump.
-    fn mend_path(&mut self) {
-        if self.stream.breaks_path(self.now) {
-            let (elapsed, period) = self.stream.place(self.now);
-            self.spline = Spline::at_rest(self.spline.reference(elapsed, period).pose);
-        }
-    }
-
-    /// Admits a pose and makes it the end of the next segment.
-    fn follow(&mut self, wanted: Pose) -> Limited {
-        let (_, period) = self.stream.place(self.now);
-        let previous = self.spline.newest();
-        let Settings { limits, wrist, .. } = &self.settings;
-        let (pose, limited) = admit(wanted, previous, period, limits, wrist);
-        self.spline.push(pose);
-        limited
-    }
-
-    /// Takes a target frame that SYNC has released.
-    pub fn receive_target(&mut self, bytes: &[u8; 8], cob_id: u16) {
-        let target = match self.stream.receive(self.now, bytes, cob_id) {
-            Received::Target(target) => target,
-            Received::Ignored => return,
-            Received::TooManyBad => {
-                self.lose_command(Emergency::COMMAND_BAD, self.stream.counters().bad);
-                return;
-            }
-        };
-        self.command(target.mode);
-        if self.machine.state() != State::Run {
-            self.note_limited(Limited::default());
-            return;
-        }
-        if self.stream.is_early(self.now) {
-            return;
-        }
-        self.mend_path();
-        let wanted = Pose {
-            yaw: target.yaw,
-            pitch: target.pitch,
-            roll: target.roll,
-        };
-        let limited = self.follow(wanted);
-        self.note_limited(limited);
-    }
-
-    /// Remembers whether the target was limited and warns when that begins.
-    fn note_limited(&mut self, limited: Limited) {
-        if limited.any() && !self.limited.any() {
-            let detail = u16::from(limited.bits());
-            self.emit(
-                Emergency::TARGET_LIMITED,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail,
-                },
-            );
-        }
-        self.limited = limited;
-        self.status = self.status.with(Condition::TargetLimited, limited.any());
-    }
-
-    /// Takes the mode of a target.
-    fn command(&mut self, mode: Mode) {
-        let before = self.machine.state();
-        let standing = CLEARED_BY_RESET
-            .iter()
-            .fold(self.status, |status, condition| {
-                status.with(*condition, false)
-            });
-        let outcome = self
-            .machine
-            .command(self.now, mode, standing.refusals().is_empty());
-        if outcome == Outcome::Reset {
-            self.reset_faults();
-        }
-        let after = self.machine.state();
-        if after != before {
-            self.currents.iter_mut().for_each(CurrentState::restart);
-            self.lost_ticks = 0;
-            self.forget_feed_forward();
-            match after {
-                State::Run => self.spline = Spline::at_rest(self.pose),
-                State::Hold => self.hold = self.pose,
-                _ => {}
-            }
-        }
-        self.note_state(before);
     }
 
     pub fn emit(&mut self, emergency: Emergency, source: Source) {

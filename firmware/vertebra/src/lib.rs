@@ -20,6 +20,7 @@ mod core;
 mod current;
 mod encoder;
 mod events;
+mod following;
 mod impedance;
 mod io;
 mod limits;

@@ -89,7 +89,7 @@ fn shake(plant: &mut Plant, seed: u64) {
 /// P2: the dry free chain flies as MuJoCo's does, over 2 s; the other's places come from
 /// `tests/python/mujoco_chain.py`.
 pub fn p2() -> Check {
-    const TABLE: &str = include_str!("../../../tests/golden/mujoco-chain.csv");
+    const TABLE: &str = include_str!("mujoco-chain.csv");
     let config = Config {
         step_s: 0.5e-3,
         water: None,

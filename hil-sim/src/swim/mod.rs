@@ -12,7 +12,7 @@ use anyhow::Context;
 use eel_head::{Config as HeadConfig, Event as HeadEvent, Gait, Phase};
 use eel_protocol::{NodeId, emergency};
 use eel_units::Instant;
-use eel_vertebra::Vertebra;
+use eel_vertebra::{Drive, Vertebra};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::bus::Event as BusEvent;
@@ -31,6 +31,8 @@ const ROW_NS: u64 = 10_000_000;
 const SHOWN_NS: u64 = 100_000_000;
 /// Longest time that a stop may take before the run ends without it.
 const STOP_LIMIT_NS: u64 = 6_000_000_000;
+/// Largest angle of a joint that counts as straight after a stop; the water moves a free wrist.
+const STRAIGHT_RAD: f64 = 0.1;
 /// Pictures of the spine in one stride.
 const SNAPSHOTS: usize = 8;
 
@@ -132,6 +134,15 @@ fn progress_bar(options: &Options) -> ProgressBar {
     bar
 }
 
+/// Tells whether every vertebra stands near home with its bridges off.
+fn is_straight_and_off(robot: &Robot) -> bool {
+    NodeId::all().all(|id| {
+        let is_off = robot.drives(id) == [Drive::Off; 3];
+        let pose = robot.plant().joint_pose(id.index());
+        is_off && pose.iter().all(|angle| angle.abs() < STRAIGHT_RAD)
+    })
+}
+
 /// Sees everything and keeps what the summary and the records need.
 struct Watcher {
     records: Records,
@@ -142,6 +153,7 @@ struct Watcher {
     next_row_ns: u64,
     stride_ns: u64,
     boots: u32,
+    stopped: bool,
     emergencies: BTreeMap<String, u32>,
 }
 
@@ -165,6 +177,7 @@ impl Watcher {
             next_row_ns: ROW_NS,
             stride_ns: (1e9 / options.frequency_hz) as u64,
             boots: 0,
+            stopped: false,
             emergencies: BTreeMap::new(),
         })
     }
@@ -254,7 +267,7 @@ impl Watcher {
             peak_torque_nm: self.tracking.peak_torque(),
             max_tracking_error_rad: self.tracking.worst_error(),
             nodes_operational: operational,
-            stopped_in_order: robot.head().phase() == Phase::Stopped,
+            stopped_in_order: self.stopped && is_straight_and_off(robot),
             emergencies: self.emergencies.values().sum(),
             emergency_names: self.emergencies,
             boots: self.boots,
@@ -294,6 +307,7 @@ impl Observer for Watcher {
     fn head(&mut self, _now: Instant, event: HeadEvent) {
         match event {
             HeadEvent::Booted(_) => self.boots += 1,
+            HeadEvent::Stopped => self.stopped = true,
             HeadEvent::Emergency(_, report) if report.code != 0 => {
                 let name = emergency::from_code(report.code).map_or_else(
                     || format!("{:04X}", report.code),

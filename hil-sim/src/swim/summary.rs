@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
+use eel_protocol::emergency::{CATALOGUE, Emergency, Severity};
 use serde::Serialize;
 
 use crate::plant::measures::Figures;
@@ -129,6 +130,12 @@ impl Summary {
                  states.csv shows the state of each"
             ));
         }
+        if let Some(first) = self.emergency_names.keys().find(|name| is_failure(name)) {
+            complaints.push(format!(
+                "vertebrae did not do what the gait asked ({first}); ask for less: a lower \
+                 --frequency or --amplitude"
+            ));
+        }
         if *frames_lost > 0 {
             complaints.push(format!(
                 "{frames_lost} frames were lost on the bus or in queues"
@@ -139,6 +146,14 @@ impl Summary {
         }
         complaints
     }
+}
+
+/// Tells whether an emergency means that a vertebra did not follow: faults, and the following error.
+fn is_failure(name: &str) -> bool {
+    let known = CATALOGUE.iter().find(|known| known.name == name);
+    known.is_none_or(|known| {
+        known.severity == Severity::Fault || *known == Emergency::FOLLOWING_ERROR
+    })
 }
 
 impl fmt::Display for Summary {

@@ -5,6 +5,8 @@ use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use eel_tests::skip;
+
 /// Seconds after which something that must come is given up; generous for a slow guest.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -20,9 +22,7 @@ pub fn interface() -> Option<String> {
         }
         Ok(name) => Some(name),
         Err(_) => {
-            let cure = "skipped: no ANGUILLA_VCAN; `cargo xtask test` runs this beside a vcan0";
-            assert!(env::var_os("CI").is_none(), "{cure}");
-            println!("{cure}");
+            skip("no ANGUILLA_VCAN; `cargo xtask test` runs this beside a vcan0");
             None
         }
     }

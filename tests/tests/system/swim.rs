@@ -52,8 +52,8 @@ fn ten_vertebrae_swim_as_eels_do() {
             node.peak_yaw_rad < std::f64::consts::FRAC_PI_6,
             "{node:?} left the workspace"
         );
-        assert!(node.peak_torque_nm < 3.6, "{node:?}");
-        assert!(node.max_tracking_error_rad < 0.15, "{node:?}");
+        assert!(node.peak_torque_nm < 2.6, "{node:?}");
+        assert!(node.max_tracking_error_rad < 0.02, "{node:?}");
     }
 }
 
