@@ -36,14 +36,21 @@ struct LiveArgs {
     #[arg(long, value_name = "IFACE")]
     can: Option<String>,
     /// With --can: which vertebrae, by node id, as 3,5 or 1-4,9; all ten without it
-    #[arg(long, requires = "can", value_name = "IDS", value_parser = node_ids)]
+    #[arg(long, value_name = "IDS", value_parser = node_ids)]
     nodes: Option<NodeList>,
     /// With --can: time until the end, s [0.1 to 1e6]
-    #[arg(long, requires = "can", value_parser = between(0.1, 1e6))]
+    #[arg(long, value_parser = between(0.1, 1e6))]
     seconds: Option<f64>,
     /// With --can: seed of encoder positions and sensor noise [default: 1]
-    #[arg(long, requires = "can")]
+    #[arg(long)]
     seed: Option<u64>,
+}
+
+impl LiveArgs {
+    /// Tells whether an option was given that means nothing without an interface.
+    fn is_used(&self) -> bool {
+        self.nodes.is_some() || self.seconds.is_some() || self.seed.is_some()
+    }
 }
 
 /// Vertebrae in the order of their node ids.
@@ -131,6 +138,10 @@ fn main() -> ExitCode {
         (Some(Command::Swim(args)), _) => run_swim(args),
         (Some(Command::Check(args)), _) => run_checks(args),
         (None, Some(interface)) => run_live(interface, &cli.live),
+        (None, None) if cli.live.is_used() => Err(anyhow::anyhow!(
+            "--nodes, --seconds and --seed go with --can IFACE; to swim in simulated time, put \
+             `swim` before the options: hil-sim swim --seconds 5"
+        )),
         (None, None) => run_swim(&SwimArgs::defaults()),
     };
     match result {

@@ -84,8 +84,8 @@ fn wrong_words_end_with_2_and_name_what_is_right() {
         (&["swim", "--amplitude", "0.21"], "0 to 0.2"),
         (&["swim", "--wavelength", "NaN"], "0.2 to 3"),
         (&["--can", "vcan0", "--nodes", "3-11"], "1 to 10"),
-        (&["--nodes", "3"], "--can <IFACE>"),
-        (&["--seconds", "3"], "--can <IFACE>"),
+        (&["--nodes", "3"], "--can IFACE"),
+        (&["--seconds", "3"], "hil-sim swim"),
         (&["swim", "--seconds", "1", "--out", "/dev/null/x"], "--out"),
     ] {
         let output = run(words);
