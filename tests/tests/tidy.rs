@@ -23,10 +23,17 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "board-stm32g474",
         &["eel-vertebra", "eel-drivers", "eel-protocol", "eel-units"],
     ),
-    // Its second binary links every logic crate, so the head too, to look for panics.
+    // Its second binary links every logic crate, so the head too, to look for panics; its third
+    // counts the instructions of the kinematics.
     (
         "board-qemu",
-        &["eel-vertebra", "eel-protocol", "eel-units", "eel-head"],
+        &[
+            "eel-vertebra",
+            "eel-protocol",
+            "eel-units",
+            "eel-head",
+            "eel-kinematics",
+        ],
     ),
     ("eel-transport", &["eel-protocol"]),
     (

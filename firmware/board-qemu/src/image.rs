@@ -1,12 +1,10 @@
 //! The loop: a packet in, a turn, a packet out.
 
-use core::fmt::Write;
-use core::panic::PanicInfo;
-
-use cortex_m_semihosting::{debug, hio};
+use cortex_m_semihosting::debug;
 use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
 use eel_vertebra::{Settings, Vertebra, turn};
 
+use crate::console::{leave, say};
 use crate::meter::Meter;
 use crate::pipe::{Broken, Pipe};
 
@@ -103,25 +101,4 @@ fn answer(vertebra: &mut Vertebra, given: lockstep::Input) -> lockstep::Output {
         frames,
         lost,
     }
-}
-
-/// Writes a line to QEMU's output.
-fn say(words: core::fmt::Arguments<'_>) {
-    if let Ok(mut out) = hio::hstdout() {
-        // Nobody is left to tell where this fails.
-        let _ = writeln!(out, "{words}");
-    }
-}
-
-/// Ends QEMU.
-fn leave(status: debug::ExitStatus) -> ! {
-    loop {
-        debug::exit(status);
-    }
-}
-
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    say(format_args!("{info}"));
-    leave(debug::EXIT_FAILURE)
 }

@@ -7,11 +7,15 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod console;
+#[cfg(target_os = "none")]
 mod image;
 #[cfg(target_os = "none")]
 mod meter;
 #[cfg(target_os = "none")]
 mod pipe;
+#[cfg(target_os = "none")]
+mod stopwatch;
 
 /// Says what to do: the image only runs in QEMU.
 #[cfg(not(target_os = "none"))]

@@ -1,19 +1,17 @@
-//! How many instructions a turn takes, by QEMU's virtual time.
+//! How many instructions the turns take.
 //!
-//! With `-icount shift=0` an instruction is a nanosecond, and SysTick counts 168 ticks in 1000 of
-//! them. Instructions are no cycles: flash, branches and the FPU cost more on silicon.
+//! Instructions are no cycles: flash, branches and the FPU cost more on silicon.
 
 use cortex_m::peripheral::SYST;
-use cortex_m::peripheral::syst::SystClkSource;
 
-const RELOAD: u32 = 0x00FF_FFFF;
+use crate::stopwatch::Stopwatch;
+
 const INSTRUCTIONS: u64 = 1_000;
 const TICKS: u64 = 168;
 
-/// Counts instructions between two points.
+/// Counts the instructions of turns.
 pub struct Meter {
-    // Nobody else may stop it.
-    _timer: SYST,
+    stopwatch: Stopwatch,
     turns: u64,
     total: u64,
     worst: u64,
@@ -31,14 +29,10 @@ pub struct Reading {
 }
 
 impl Meter {
-    /// Starts SysTick.
-    pub fn new(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(RELOAD);
-        timer.clear_current();
-        timer.enable_counter();
+    /// Starts the clock.
+    pub fn new(timer: SYST) -> Self {
         Self {
-            _timer: timer,
+            stopwatch: Stopwatch::new(timer),
             turns: 0,
             total: 0,
             worst: 0,
@@ -47,10 +41,7 @@ impl Meter {
 
     /// Does a turn and counts it.
     pub fn count<Result>(&mut self, turn: impl FnOnce() -> Result) -> Result {
-        let before = SYST::get_current();
-        let result = turn();
-        // It counts down.
-        let ticks = before.wrapping_sub(SYST::get_current()) & RELOAD;
+        let (result, ticks) = self.stopwatch.time(turn);
         let instructions = u64::from(ticks) * INSTRUCTIONS / TICKS;
         self.turns += 1;
         self.total += instructions;

@@ -1,4 +1,4 @@
-//! A toolchain for the Cortex-M4F, wherever one can be had.
+//! A toolchain for the Cortex-M4F and the Cortex-M3, wherever one can be had.
 //!
 //! The first that holds: the target is installed; Debian's own compiler with its library's source;
 //! rustup can fetch the target.
@@ -15,6 +15,8 @@ use crate::setup;
 
 /// The target of every image: Cortex-M4 with single-precision floating point.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target that is only measured: Cortex-M3, without the DSP instructions and without floats.
+pub const CORTEX_M3: &str = "thumbv7m-none-eabi";
 
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
@@ -34,7 +36,16 @@ enum Toolchain {
 /// # Errors
 /// When there is no toolchain and none can be had.
 pub fn build_command() -> Result<Command> {
-    let mut build = match choose()? {
+    build_command_for(TARGET)
+}
+
+/// Starts a cross build as [`build_command`] does, for a target that is named.
+///
+/// # Errors
+/// When there is no toolchain and none can be had.
+pub fn build_command_for(target: &str) -> Result<Command> {
+    let variable = target.to_uppercase().replace('-', "_");
+    let mut build = match choose(target)? {
         Toolchain::Installed => {
             let mut build = process::cargo();
             build.arg("build");
@@ -49,14 +60,14 @@ pub fn build_command() -> Result<Command> {
                 "build.rustc-wrapper=''",
             ]);
             build.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
-            build.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker()?);
+            build.env(format!("CARGO_TARGET_{variable}_LINKER"), linker()?);
             build
         }
     };
-    build.args(["--profile", "firmware", "--target", TARGET]);
+    build.args(["--profile", "firmware", "--target", target]);
     // Of their own, or host and cross builds would make each other stale.
     build.arg("--target-dir").arg(cross_dir());
-    build.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", rust_flags());
+    build.env(format!("CARGO_TARGET_{variable}_RUSTFLAGS"), rust_flags());
     for variable in [
         "RUSTFLAGS",
         "CARGO_ENCODED_RUSTFLAGS",
@@ -75,12 +86,17 @@ pub fn cross_dir() -> PathBuf {
 
 /// Returns where the linked image of a binary is.
 pub fn built(binary: &str) -> PathBuf {
-    cross_dir().join(TARGET).join("firmware").join(binary)
+    built_for(TARGET, binary)
+}
+
+/// Returns where the linked image of a binary is for a target that is named.
+pub fn built_for(target: &str, binary: &str) -> PathBuf {
+    cross_dir().join(target).join("firmware").join(binary)
 }
 
 /// Chooses the toolchain, and installs what it takes where that is possible.
-fn choose() -> Result<Toolchain> {
-    if host_sysroot()?.join("lib/rustlib").join(TARGET).is_dir() {
+fn choose(target: &str) -> Result<Toolchain> {
+    if host_sysroot()?.join("lib/rustlib").join(target).is_dir() {
         return Ok(Toolchain::Installed);
     }
     if has_debian_toolchain() {
@@ -92,9 +108,9 @@ fn choose() -> Result<Toolchain> {
             return Ok(Toolchain::Debian);
         }
     }
-    println!("no compiler for {TARGET}: running `rustup target add {TARGET}`");
-    process::run(command("rustup").args(["target", "add", TARGET]))
-        .with_context(|| format!("the images need the target {TARGET}"))?;
+    eprintln!("no compiler for {target}: running `rustup target add {target}`");
+    process::run(command("rustup").args(["target", "add", target]))
+        .with_context(|| format!("the images need the target {target}"))?;
     Ok(Toolchain::Installed)
 }
 

@@ -4,6 +4,7 @@
 //! of its crates but their names.
 
 mod cross;
+mod cycles;
 mod firmware;
 mod generated;
 mod image;
@@ -66,6 +67,15 @@ enum Task {
     Size,
     /// Fails when a panicking symbol is reachable from the logic crates on the target.
     Panics,
+    /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU.
+    Cycles {
+        /// Prints JSON.
+        #[arg(long)]
+        json: bool,
+        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %.
+        #[arg(long)]
+        check: bool,
+    },
 }
 
 fn main() -> ExitCode {
@@ -81,6 +91,7 @@ fn main() -> ExitCode {
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
+        Task::Cycles { json, check } => cycles::run(json, check),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

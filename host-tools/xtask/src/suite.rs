@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{firmware, generated, panics, setup, vcan};
+use crate::{cycles, firmware, generated, panics, setup, vcan};
 
 /// One step: its name, and whether it needs a tool beyond cargo.
 struct Step {
@@ -16,7 +16,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 10] = [
+const STEPS: [Step; 11] = [
     Step {
         name: "tools",
         needs_tools: true,
@@ -41,6 +41,11 @@ const STEPS: [Step; 10] = [
         name: "no panic in logic",
         needs_tools: true,
         run: panics::check,
+    },
+    Step {
+        name: "instruction budgets",
+        needs_tools: true,
+        run: || cycles::run(false, true),
     },
     Step {
         name: "tests",
