@@ -4,10 +4,12 @@
 //! measured geometry. Only `libm`'s functions, so that every machine gives the same bits.
 //! Lengths are in units of the platform's arm |OC|; angles do not depend on the scale.
 
+mod condition;
 mod geometry;
 mod jacobians;
 mod kernel;
 
+pub use condition::{condition, singular_values};
 pub use geometry::{Geometry, Leg};
 pub use jacobians::Jacobians;
 pub use nalgebra::{Matrix3, Vector3};
