@@ -8,6 +8,7 @@ use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
 use crate::source::Limits;
 use crate::stats::Statistics;
+use crate::wrist::Wrist;
 use crate::{json, report};
 
 const AFTER: &str = "\
@@ -15,16 +16,17 @@ Buses: vcan0 or can0 (SocketCAN, Linux), a candump file (candump -L; its name ha
 slash), or - for a candump recording on standard input. eel only listens; it never sends.
 
 Exit codes: 0 fine; 1 found a fault (bad, lost, repeated or late frames, a fault emergency, a line
-that can't be read); 2 wrong usage; 3 the bus or the file failed.
+that can't be read); 2 wrong usage, or a wrist that can't; 3 the bus or the file failed.
 
 Examples:
   eel sniff vcan0 --node 3 --name pose        what vertebra 3 reports, live
   eel sniff can0 --record dive.log --stats    everything, recorded, with a table at the end
   eel decode swim.log --name target.yaw --json
   eel stats swim.log                          load, rates, jitter, losses
-  eel export all --out docs/generated         EDS, DBC and tables for other tools";
+  eel export all --out docs/generated         EDS, DBC and tables for other tools
+  eel wrist ik --yaw 20 --degrees             motor angles for a pose; eel wrist --help says more";
 
-/// Anguilla's bus in words and numbers: sniff, decode, measure
+/// Anguilla's bus in words and numbers, and its wrist: sniff, decode, measure, ask
 #[derive(Debug, Parser)]
 #[command(name = "eel", version, after_help = AFTER, disable_help_subcommand = true)]
 pub struct Eel {
@@ -45,6 +47,8 @@ pub enum Command {
     Stats(Stats),
     /// Write the dictionary as EDS, DBC or markdown
     Export(Export),
+    /// Ask the wrist: inverse, direct, Jacobian, torques, margins, and the paper's claims
+    Wrist(Wrist),
 }
 
 fn listen_help() -> String {

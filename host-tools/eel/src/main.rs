@@ -1,4 +1,4 @@
-//! The `eel` command: what is on the bus, in words and numbers.
+//! The `eel` command: what is on the bus, in words and numbers, and what the wrist answers.
 
 mod cli;
 mod decode;
@@ -11,6 +11,7 @@ mod sdo;
 mod source;
 mod stats;
 mod text;
+mod wrist;
 
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         ),
         Command::Stats(stats) => measure(&stats),
         Command::Export(export) => export::export(export.format, export.out.as_deref()).map(|()| 0),
+        Command::Wrist(wrist) => wrist::run(&wrist),
     };
     match result {
         Ok(0) => ExitCode::SUCCESS,
@@ -57,7 +59,7 @@ fn main() -> ExitCode {
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("eel: {error:#}");
-            ExitCode::from(3)
+            ExitCode::from(if error.is::<wrist::Refused>() { 2 } else { 3 })
         }
     }
 }

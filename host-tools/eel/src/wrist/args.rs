@@ -1,0 +1,226 @@
+//! The arguments of `eel wrist`.
+
+use clap::{Args, Subcommand, ValueEnum};
+use eel_kinematics::design::Geometry;
+use serde::Serialize;
+
+const AFTER: &str = "\
+Angles are in radians (--degrees: all of them, in and out), moments and torques in N·m, in the base
+frame: x dorsoventral, y lateral, z along the body. A pose is R = Rx(yaw) Ry(pitch) Rz(roll) Rz(π/4), or
+the paper's R = Rz(theta3) Ry(phi) Rx(psi). Home is yaw = pitch = roll = 0, theta = (0, 0, π/4).
+
+The home branch: (l×r)·i > 0 on both legs, det A > 0, cos phi > 0.
+
+Exit codes: 0 answered; 1 a claim that should hold does not (paper); 2 wrong usage, or no
+configuration answers.
+
+Examples:
+  eel wrist ik --yaw 20 --pitch 5 --degrees          motor angles, fixed point beside double precision
+  eel wrist ik --theta3 0.7854 --phi 0.2618 --psi 0.2618 --all --json
+  eel wrist fk --theta 0.1,0.2,0.785398 --all        the four platforms of Fig. 12
+  eel wrist torque --moment 2,0.5,0 --limits -0.8,0.8
+  eel wrist paper                                    what the paper says, and what is true";
+
+const IK_JSON: &str = "\
+--json: architecture, kernel (who gave theta), unit, pose, theta (home branch), theta_f64, theta_fixed
+(null where the kernel does not answer; fixed_refusal says why), det_a, b, condition (of A),
+condition_of_rates (of B⁻¹A), margin (1 at home, 0 where a crank and its rod line up); with --all
+solutions (four, home first) and working_modes (signs of (l×r)·i on legs 1 and 2).";
+
+const FK_JSON: &str = "\
+--json: architecture, kernel (who gave the pose), unit, theta, phi, psi, yaw, pitch, roll, det_a,
+fixed and f64 (both answers), fixed_refusal, solutions (all that exist, home first, each with branch and
+det_a).";
+
+const JACOBIAN_JSON: &str = "\
+A ω = B θ̇ with rows of A: p1×r1, p2×r2, z''. Computed in double precision.
+
+--json: architecture, unit (of theta), theta, a (rows), b (the diagonal of B), rate_map (B⁻¹A: θ̇ from ω,
+null entries at a serial singularity), torque_map (B A⁻ᵀ: τ from M), torque_map_fixed (the kernel's, or
+null), det_a, condition, condition_of_rates.";
+
+const TORQUE_JSON: &str = "\
+Yaw is granted first, then pitch, then roll, each as large a fraction as the motors allow.
+
+--json: architecture, kernel (who gave tau), tau, achieved, unallocated (N·m), bound (per motor: null,
+low or high), tau_f64, tau_fixed (null where the kernel does not answer; fixed_refusal says why).";
+
+const MARGIN_JSON: &str = "\
+Each margin is 1 at home and 0 at its singularity, and varies continuously between.
+
+--json: architecture, kernel (who gave margin), margin (the lesser of serial 1 and 2), serial (legs 1
+and 2 by (l×r)·i over home's, leg 3 by cos phi), assembly (det A), least (of all four), fixed_refusal.";
+
+/// The questions one can ask the wrist.
+#[derive(Debug, Args)]
+#[command(after_help = AFTER)]
+pub struct Wrist {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Motor angles for a pose
+    #[command(after_help = IK_JSON)]
+    Ik(Ik),
+    /// The pose for motor angles
+    #[command(after_help = FK_JSON)]
+    Fk(Fk),
+    /// A, B, their maps and condition numbers at a pose
+    #[command(after_help = JACOBIAN_JSON)]
+    Jacobian(At),
+    /// Motor torques for a moment at a pose, within bounds
+    #[command(after_help = TORQUE_JSON)]
+    Torque(Torque),
+    /// How far a pose is from each singularity
+    #[command(after_help = MARGIN_JSON)]
+    Margin(At),
+    /// Every claim of the paper: printed, computed, verdict, errata
+    Paper(Paper),
+}
+
+/// The three wrists of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Architecture {
+    /// Both crank axes along x, crank 1
+    ParallelAxes,
+    /// Crank axes at right angles through the centre, crank √2
+    OrthogonalAxes,
+    /// The prototype's: crank √½
+    ParallelActuators,
+}
+
+/// Who answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// The firmware's fixed-point kernel: parallel-actuators, home branch
+    Fixed,
+    /// The general model in double precision
+    F64,
+}
+
+/// What all questions have in common.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Common {
+    /// Which wrist
+    #[arg(
+        long,
+        value_enum,
+        value_name = "NAME",
+        default_value = "parallel-actuators"
+    )]
+    pub architecture: Architecture,
+    /// Who answers [default: fixed where it can, else f64]
+    #[arg(long, value_enum, value_name = "KERNEL")]
+    pub kernel: Option<Kernel>,
+    /// Angles in degrees, in and out
+    #[arg(long)]
+    pub degrees: bool,
+    /// Write one JSON object (keys below)
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A pose; angles that are left out are home's.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PoseArguments {
+    /// Lateral bending, about x
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    pub yaw: Option<f64>,
+    /// Dorsoventral bending, about the yawed y
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    pub pitch: Option<f64>,
+    /// Torsion, about the yawed and pitched z
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    pub roll: Option<f64>,
+    /// The paper's first angle, about z; home has π/4
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    pub theta3: Option<f64>,
+    /// The paper's second angle, about y', within ±π/2
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    pub phi: Option<f64>,
+    /// The paper's third angle, about x''
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    pub psi: Option<f64>,
+}
+
+/// A question at a pose.
+#[derive(Debug, Args)]
+pub struct At {
+    #[command(flatten)]
+    pub common: Common,
+    #[command(flatten)]
+    pub pose: PoseArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct Ik {
+    #[command(flatten)]
+    pub at: At,
+    /// All four solutions too
+    #[arg(long)]
+    pub all: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Fk {
+    #[command(flatten)]
+    pub common: Common,
+    /// The three motor angles, as in 0.1,0.2,0.785
+    #[arg(long, value_name = "A,B,C", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub theta: Vec<f64>,
+    /// All solutions too (--json always has them)
+    #[arg(long)]
+    pub all: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Torque {
+    #[command(flatten)]
+    pub at: At,
+    /// The moment on the platform about x (yaw), y (pitch), z (roll), in N·m
+    #[arg(long, value_name = "X,Y,Z", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub moment: Vec<f64>,
+    /// Torque bounds in N·m: LOW,HIGH for all motors, or three such pairs; LOW ≤ 0 ≤ HIGH
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub limits: Vec<f64>,
+}
+
+#[derive(Debug, Args)]
+pub struct Paper {
+    /// Write a JSON array of claims: source, claim, printed, computed, verdict, erratum
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let number = text
+        .trim()
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| "expected a finite number such as 0.25 or -1e-3".to_owned())
+}
+
+impl Architecture {
+    /// Returns its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ParallelAxes => "parallel-axes",
+            Self::OrthogonalAxes => "orthogonal-axes",
+            Self::ParallelActuators => "parallel-actuators",
+        }
+    }
+
+    /// Returns the paper's geometry.
+    pub const fn geometry(self) -> Geometry {
+        match self {
+            Self::ParallelAxes => Geometry::PARALLEL_AXES,
+            Self::OrthogonalAxes => Geometry::ORTHOGONAL_AXES,
+            Self::ParallelActuators => Geometry::PARALLEL_ACTUATORS,
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! `eel wrist fk`: the pose for motor angles.
+
+use std::io::Write;
+
+use anyhow::Result;
+use eel_kinematics::Direct;
+use eel_kinematics::design::{self, Geometry, Matrix3};
+use serde::Serialize;
+
+use super::args::{Architecture, Fk, Kernel};
+use super::fixed::{self, Choice};
+use super::number::{Unit, plain};
+use super::refused;
+
+/// Assembly modes in the order of `Geometry::direct_all`.
+const BRANCHES: [&str; 4] = ["home", "other-psi", "other-phi", "other-both"];
+
+#[derive(Serialize)]
+struct Answer {
+    architecture: Architecture,
+    kernel: Kernel,
+    unit: &'static str,
+    theta: [f64; 3],
+    #[serde(flatten)]
+    answer: Platform,
+    f64: Platform,
+    fixed: Option<Platform>,
+    fixed_refusal: Option<&'static str>,
+    solutions: Vec<Solution>,
+}
+
+#[derive(Clone, Copy, Serialize)]
+struct Platform {
+    phi: f64,
+    psi: f64,
+    yaw: f64,
+    pitch: f64,
+    roll: f64,
+    det_a: f64,
+}
+
+#[derive(Serialize)]
+struct Solution {
+    branch: &'static str,
+    #[serde(flatten)]
+    platform: Platform,
+}
+
+impl Platform {
+    /// Returns the angles in rad of an orientation that motor 3 turned by a known angle.
+    fn of(rotation: &Matrix3<f64>, theta3: f64, det_a: f64) -> Self {
+        let [phi, psi] = phi_psi(rotation, theta3);
+        let [yaw, pitch, roll] = design::pose(rotation);
+        Self {
+            phi,
+            psi,
+            yaw,
+            pitch,
+            roll,
+            det_a,
+        }
+    }
+
+    fn angles(&self) -> [f64; 5] {
+        [self.phi, self.psi, self.yaw, self.pitch, self.roll]
+    }
+
+    fn in_unit(&self, unit: Unit) -> Self {
+        let [phi, psi, yaw, pitch, roll] = unit.show(self.angles());
+        Self {
+            phi,
+            psi,
+            yaw,
+            pitch,
+            roll,
+            det_a: self.det_a,
+        }
+    }
+}
+
+/// Returns φ and ψ of R = Rz(θ3) Ry(φ) Rx(ψ) where θ3 is known; φ may be beyond ±π/2.
+pub fn phi_psi(rotation: &Matrix3<f64>, theta3: f64) -> [f64; 2] {
+    let turned = design::rotation_from_platform(-theta3, 0.0, 0.0) * rotation;
+    [
+        (-turned[(2, 0)]).atan2(turned[(0, 0)]),
+        (-turned[(1, 2)]).atan2(turned[(1, 1)]),
+    ]
+}
+
+/// Answers `eel wrist fk`.
+pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
+    let unit = Unit::of(&fk.common);
+    let Ok(asked) = <[f64; 3]>::try_from(fk.theta.clone()) else {
+        return Err(refused(format!(
+            "--theta takes three angles, as in --theta 0.1,0.2,0.785; {} came",
+            fk.theta.len()
+        )));
+    };
+    let theta = asked.map(|angle| unit.read(angle));
+    let geometry = fk.common.architecture.geometry();
+    let all = platforms(&geometry, &theta);
+    let home = match all.first() {
+        Some(("home", platform)) if geometry.direct(&theta).is_some() => *platform,
+        _ => {
+            return Err(refused(
+                "no platform joins these motor angles in the home branch; bring theta nearer to home, \
+                 (0, 0, π/4) rad (angles are in radians without --degrees)",
+            ));
+        }
+    };
+    let choice = fixed::choose(&fk.common, || fixed::direct(&theta))?;
+    let of_kernel = choice
+        .fixed
+        .as_ref()
+        .map(|found| kernel_platform(found, theta[2]));
+    if !fk.common.json {
+        return write_text(out, fk, unit, (&home, of_kernel.as_ref()), &all, &choice);
+    }
+    let fixed = of_kernel.map(|platform| platform.in_unit(unit));
+    let f64 = home.in_unit(unit);
+    let solutions = all.iter().map(|(branch, platform)| Solution {
+        branch,
+        platform: platform.in_unit(unit),
+    });
+    let answer = Answer {
+        architecture: fk.common.architecture,
+        kernel: choice.used,
+        unit: unit.name,
+        theta: asked,
+        answer: fixed
+            .filter(|_| choice.used == Kernel::Fixed)
+            .unwrap_or(f64),
+        f64,
+        fixed,
+        fixed_refusal: choice.refusal,
+        solutions: solutions.collect(),
+    };
+    serde_json::to_writer(&mut *out, &answer)?;
+    Ok(writeln!(out)?)
+}
+
+/// Returns every direct solution with its branch, home's first.
+fn platforms(geometry: &Geometry, theta: &[f64; 3]) -> Vec<(&'static str, Platform)> {
+    let found = BRANCHES.into_iter().zip(geometry.direct_all(theta));
+    found
+        .filter_map(|(branch, rotation)| {
+            let rotation = rotation?;
+            let det_a = geometry.jacobians(&rotation, theta).det_a();
+            Some((branch, Platform::of(&rotation, theta[2], det_a)))
+        })
+        .collect()
+}
+
+fn kernel_platform(found: &Direct, theta3: f64) -> Platform {
+    let det_a = f64::from(found.jacobian.det_a()) / f64::from(1 << 30);
+    let mut platform = Platform::of(&fixed::matrix(&found.rotation), theta3, det_a);
+    let pose = found.rotation.to_pose();
+    [platform.yaw, platform.pitch, platform.roll] =
+        [pose.yaw, pose.pitch, pose.roll].map(fixed::radians);
+    platform
+}
+
+fn write_text(
+    out: &mut dyn Write,
+    fk: &Fk,
+    unit: Unit,
+    (home, of_kernel): (&Platform, Option<&Platform>),
+    all: &[(&'static str, Platform)],
+    choice: &Choice<Direct>,
+) -> Result<()> {
+    writeln!(
+        out,
+        "{}, angles in {}",
+        fk.common.architecture.name(),
+        unit.name
+    )?;
+    let heads = ["phi", "psi", "yaw", "pitch", "roll", "det A"];
+    let heads: String = heads.iter().map(|head| format!("{head:>14}")).collect();
+    writeln!(out, "            {heads}")?;
+    let mut line = |name: &str, platform: &Platform| {
+        let angles = unit.columns(&platform.angles());
+        writeln!(out, "  {name:<10}{angles}{:>14}", plain(platform.det_a, 6))
+    };
+    if let Some(platform) = of_kernel {
+        line("fixed", platform)?;
+    }
+    line("f64", home)?;
+    if fk.all {
+        for (branch, platform) in all {
+            line(branch, platform)?;
+        }
+    }
+    if let Some(reason) = choice.refusal {
+        writeln!(out, "  fixed     none: {reason}")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,54 @@
+//! `eel wrist`: asks the wrist of a vertebra, in double precision and as the firmware answers.
+//!
+//! The general model (`eel_kinematics::design`) answers for all three architectures of the paper;
+//! the firmware's fixed-point kernel for the prototype's, in the home branch. Both answers are shown.
+
+mod args;
+mod direct;
+mod fixed;
+mod inverse;
+mod number;
+mod paper;
+mod place;
+mod share;
+mod statics;
+
+use std::fmt;
+use std::io::{BufWriter, Write, stdout};
+
+use anyhow::Result;
+
+use args::Command;
+pub use args::Wrist;
+
+/// A question that has no answer, with the cure. The exit code is 2.
+#[derive(Debug)]
+pub struct Refused(String);
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Refused {}
+
+/// Makes the error of a question without an answer.
+fn refused(text: impl Into<String>) -> anyhow::Error {
+    anyhow::Error::new(Refused(text.into()))
+}
+
+/// Answers, and returns how many claims that should hold do not.
+pub fn run(wrist: &Wrist) -> Result<u64> {
+    let mut out = BufWriter::new(stdout().lock());
+    let problems = match &wrist.command {
+        Command::Ik(ik) => inverse::run(&mut out, ik).map(|()| 0),
+        Command::Fk(fk) => direct::run(&mut out, fk).map(|()| 0),
+        Command::Jacobian(at) => statics::jacobian(&mut out, at).map(|()| 0),
+        Command::Torque(torque) => share::run(&mut out, torque).map(|()| 0),
+        Command::Margin(at) => statics::margin(&mut out, at).map(|()| 0),
+        Command::Paper(paper) => paper::run(&mut out, paper.json),
+    }?;
+    out.flush()?;
+    Ok(problems)
+}
