@@ -342,14 +342,14 @@ fn the_papers_claims_hold_or_are_named_errata() {
 
 #[test]
 fn what_has_no_answer_exits_with_2_and_names_the_cure() {
-    let cases: [(&[&str], &str); 12] = [
+    let cases: [(&[&str], &str); 15] = [
         (
             &["ik", "--yaw", "0.5", "--pitch", "1"],
             "are still in reach",
         ),
         (&["ik", "--phi", "2"], "--phi must be within"),
         (&["ik", "--phi", "1.5707963267948966"], "out of reach"),
-        (&["ik", "--yaw", "nan"], "expected a finite number"),
+        (&["ik", "--yaw", "nan"], "expected a number within"),
         (
             &["ik", "--yaw", "0.1", "--psi", "0.1"],
             "cannot be used with",
@@ -360,6 +360,12 @@ fn what_has_no_answer_exits_with_2_and_names_the_cure() {
             "--kernel f64",
         ),
         (&["fk", "--theta", "0.1,0.2"], "takes three angles"),
+        (&["ik", "--yaw", "20"], "with --degrees in degrees"),
+        (&["fk", "--theta", "20,20,45"], "with --degrees in degrees"),
+        (
+            &["torque", "--moment", "1e300,0,0"],
+            "expected a number within",
+        ),
         (&["fk", "--theta", "3,1,1"], "bring theta nearer to home"),
         (&["torque", "--moment", "1,2"], "takes three numbers"),
         (

@@ -128,22 +128,22 @@ pub struct Common {
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PoseArguments {
     /// Lateral bending, about x
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number, conflicts_with_all = ["theta3", "phi", "psi"])]
     pub yaw: Option<f64>,
     /// Dorsoventral bending, about the yawed y
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number, conflicts_with_all = ["theta3", "phi", "psi"])]
     pub pitch: Option<f64>,
     /// Torsion, about the yawed and pitched z
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite, conflicts_with_all = ["theta3", "phi", "psi"])]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number, conflicts_with_all = ["theta3", "phi", "psi"])]
     pub roll: Option<f64>,
     /// The paper's first angle, about z; home has π/4
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number)]
     pub theta3: Option<f64>,
     /// The paper's second angle, about y', within ±π/2
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number)]
     pub phi: Option<f64>,
     /// The paper's third angle, about x''
-    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "ANGLE", allow_hyphen_values = true, value_parser = number)]
     pub psi: Option<f64>,
 }
 
@@ -170,7 +170,7 @@ pub struct Fk {
     #[command(flatten)]
     pub common: Common,
     /// The three motor angles, as in 0.1,0.2,0.785
-    #[arg(long, value_name = "A,B,C", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "A,B,C", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub theta: Vec<f64>,
     /// All solutions too (--json always has them)
     #[arg(long)]
@@ -182,10 +182,10 @@ pub struct Torque {
     #[command(flatten)]
     pub at: At,
     /// The moment on the platform about x (yaw), y (pitch), z (roll), in N·m
-    #[arg(long, value_name = "X,Y,Z", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "X,Y,Z", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub moment: Vec<f64>,
     /// Torque bounds in N·m: LOW,HIGH for all motors, or three such pairs; LOW ≤ 0 ≤ HIGH
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub limits: Vec<f64>,
 }
 
@@ -196,13 +196,13 @@ pub struct Paper {
     pub json: bool,
 }
 
-fn finite(text: &str) -> Result<f64, String> {
+fn number(text: &str) -> Result<f64, String> {
     let number = text
         .trim()
         .parse()
         .ok()
-        .filter(|number: &f64| number.is_finite());
-    number.ok_or_else(|| "expected a finite number such as 0.25 or -1e-3".to_owned())
+        .filter(|value: &f64| value.abs() <= 1e6);
+    number.ok_or_else(|| "expected a number within ±1000000, such as 0.25 or -1e-3".to_owned())
 }
 
 impl Architecture {

@@ -96,7 +96,8 @@ pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
             fk.theta.len()
         )));
     };
-    let theta = asked.map(|angle| unit.read(angle));
+    let [a, b, c] = asked;
+    let theta = [unit.read(a)?, unit.read(b)?, unit.read(c)?];
     let geometry = fk.common.architecture.geometry();
     let all = platforms(&geometry, &theta);
     let home = match all.first() {

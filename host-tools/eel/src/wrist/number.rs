@@ -1,6 +1,9 @@
 //! Numbers for people: units, columns, no negative zeros.
 
+use anyhow::Result;
+
 use super::args::Common;
+use super::refused;
 
 /// The unit of angles at the command line.
 #[derive(Clone, Copy, Debug)]
@@ -29,9 +32,17 @@ impl Unit {
         }
     }
 
-    /// Returns radians for a number in this unit.
-    pub fn read(self, number: f64) -> f64 {
-        number / self.per_radian
+    /// Returns radians for a number in this unit; refuses more than a turn, which mostly is degrees
+    /// taken for radians.
+    pub fn read(self, number: f64) -> Result<f64> {
+        let radians = number / self.per_radian;
+        if radians.abs() > std::f64::consts::TAU {
+            return Err(refused(format!(
+                "{number} {} is more than a turn; angles are in radians, with --degrees in degrees",
+                self.name
+            )));
+        }
+        Ok(radians)
     }
 
     /// Returns numbers in this unit for radians.

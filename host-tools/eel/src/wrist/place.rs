@@ -67,12 +67,16 @@ pub fn at_home(geometry: &Geometry) -> Jacobians {
 
 fn orientation(at: &At, unit: Unit) -> Result<([f64; 3], Matrix3<f64>)> {
     let asked = &at.pose;
-    let radians = |angle: Option<f64>, home: f64| angle.map_or(home, |a| unit.read(a));
+    let radians = |angle: Option<f64>, home: f64| angle.map_or(Ok(home), |a| unit.read(a));
     if asked.theta3.or(asked.phi).or(asked.psi).is_none() {
-        let pose = [asked.yaw, asked.pitch, asked.roll].map(|angle| radians(angle, 0.0));
+        let pose = [
+            radians(asked.yaw, 0.0)?,
+            radians(asked.pitch, 0.0)?,
+            radians(asked.roll, 0.0)?,
+        ];
         return Ok((pose, design::rotation(pose[0], pose[1], pose[2])));
     }
-    let phi = radians(asked.phi, 0.0);
+    let phi = radians(asked.phi, 0.0)?;
     if phi.abs() > std::f64::consts::FRAC_PI_2 {
         return Err(refused(
             "--phi must be within ±90° (π/2 rad): beyond it the same orientation is reached with \
@@ -80,9 +84,9 @@ fn orientation(at: &At, unit: Unit) -> Result<([f64; 3], Matrix3<f64>)> {
         ));
     }
     let rotation = design::rotation_from_platform(
-        radians(asked.theta3, FRAC_PI_4),
+        radians(asked.theta3, FRAC_PI_4)?,
         phi,
-        radians(asked.psi, 0.0),
+        radians(asked.psi, 0.0)?,
     );
     Ok((design::pose(&rotation), rotation))
 }
