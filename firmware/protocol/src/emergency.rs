@@ -166,11 +166,16 @@ pub struct Source {
 
 impl Source {
     /// The whole wrist, without a detail.
-    pub const WHOLE: Self = Self {
-        motor: 0,
-        limit: 0,
-        detail: 0,
-    };
+    pub const WHOLE: Self = Self::whole(0);
+
+    /// Names the whole wrist and a number.
+    pub const fn whole(detail: u16) -> Self {
+        Self {
+            motor: 0,
+            limit: 0,
+            detail,
+        }
+    }
 
     /// Returns the five bytes; the last is reserved and 0.
     pub const fn to_bytes(self) -> [u8; 5] {

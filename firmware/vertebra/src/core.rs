@@ -20,10 +20,6 @@ use crate::settings::Settings;
 use crate::spline::{Reference, Spline};
 use crate::workspace::Limited;
 
-/// Deviation from the reference that is worth a warning: 150 mrad.
-const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
-/// Deviation below which that warning ends: 100 mrad, so that noise doesn't repeat it.
-const FOLLOWING_END: Angle = Angle::from_milliradians(100);
 /// Conditions that are told as warnings while they hold.
 const WARNINGS: [Condition; 3] = [
     Condition::TargetLimited,
@@ -272,30 +268,6 @@ impl Core {
         let (moment, error) = self
             .impedance
             .moment(motion, &reference, &self.feed_forward);
-        let was_far = self.status.contains(Condition::FollowingError);
-        let limit = if was_far {
-            FOLLOWING_END
-        } else {
-            FOLLOWING_LIMIT
-        };
-        let far = error.iter().any(|axis| axis.abs() > limit);
-        if far && !was_far {
-            let worst = error
-                .iter()
-                .map(|axis| axis.abs())
-                .max()
-                .unwrap_or_default();
-            let detail = worst.to_tenth_milliradians().unsigned_abs();
-            self.emit(
-                Emergency::FOLLOWING_ERROR,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail,
-                },
-            );
-        }
-        self.status = self.status.with(Condition::FollowingError, far);
         let worst = error.iter().map(|axis| axis.abs()).max();
         self.watch_following(worst.unwrap_or_default());
         self.reference = Some(reference);

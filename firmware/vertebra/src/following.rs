@@ -46,14 +46,7 @@ impl Core {
     fn continue_path(&mut self, missed: u8) {
         let late = missed > BRIDGED_PERIODS && self.machine.state() == State::Run;
         if late && !self.status.contains(Condition::CommandLate) {
-            self.emit(
-                Emergency::COMMAND_LATE,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail: u16::from(missed),
-                },
-            );
+            self.emit(Emergency::COMMAND_LATE, Source::whole(u16::from(missed)));
         }
         self.status = self.status.with(Condition::CommandLate, late);
         if missed == 0 {
@@ -117,14 +110,7 @@ impl Core {
     pub fn note_limited(&mut self, limited: Limited) {
         if limited.any() && !self.limited.any() {
             let detail = u16::from(limited.bits());
-            self.emit(
-                Emergency::TARGET_LIMITED,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail,
-                },
-            );
+            self.emit(Emergency::TARGET_LIMITED, Source::whole(detail));
         }
         self.limited = limited;
         self.status = self.status.with(Condition::TargetLimited, limited.any());

@@ -17,6 +17,10 @@ const OVER_CURRENT_TICKS: u8 = 3;
 /// Largest difference between the measured angles and those of the measured pose: 1 mrad.
 const RESIDUAL_LIMIT: Angle = Angle::from_milliradians(1);
 
+/// Deviation from the reference that is worth a warning: 150 mrad.
+const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
+/// Deviation below which that warning ends: 100 mrad, so that noise doesn't repeat it.
+const FOLLOWING_END: Angle = Angle::from_milliradians(100);
 /// Deviation from the reference that no wrist has which still follows: 350 mrad.
 const LOST_LIMIT: Angle = Angle::from_milliradians(350);
 /// Ticks for which the deviation may be that large.
@@ -173,14 +177,7 @@ impl Core {
         let before = self.machine.state();
         if self.machine.stop(self.now) {
             let detail = detail.min(0xFFFF) as u16;
-            self.emit(
-                emergency,
-                Source {
-                    motor: 0,
-                    limit: 0,
-                    detail,
-                },
-            );
+            self.emit(emergency, Source::whole(detail));
         }
         self.note_state(before);
     }
@@ -224,17 +221,27 @@ impl Core {
         self.status = self.status.with(Condition::HeadLost, false);
     }
 
-    /// Faults a wrist that has been far from its reference for too long: a stuck mechanism, a motor
-    /// connected the wrong way round, or a gait that is beyond the motors.
+    /// Warns of a wrist that is far from its reference, and faults one that is farther for too
+    /// long: a stuck mechanism, a motor connected the wrong way round, a gait beyond the motors.
     pub fn watch_following(&mut self, worst: Angle) {
-        let lost = worst > LOST_LIMIT;
-        self.lost_ticks = if lost {
+        let detail = worst.to_tenth_milliradians().unsigned_abs();
+        let was_far = self.status.contains(Condition::FollowingError);
+        let limit = if was_far {
+            FOLLOWING_END
+        } else {
+            FOLLOWING_LIMIT
+        };
+        let far = worst > limit;
+        if far && !was_far {
+            self.emit(Emergency::FOLLOWING_ERROR, Source::whole(detail));
+        }
+        self.status = self.status.with(Condition::FollowingError, far);
+        self.lost_ticks = if worst > LOST_LIMIT {
             self.lost_ticks.saturating_add(1)
         } else {
             0
         };
         if self.lost_ticks >= LOST_TICKS {
-            let detail = worst.to_tenth_milliradians().unsigned_abs();
             self.pending.fault(Emergency::NOT_FOLLOWING, None, detail);
         }
     }
