@@ -1,4 +1,4 @@
-//! Tells the crate whether the target has the DSP multiplies (SMMULR, SMMLAR).
+//! Tells the crate whether the target has the DSP multiplies (SMMUL, SMMLA).
 //!
 //! Stable rustc does not show `target_feature = "dsp"` to `cfg`, so the target's name decides:
 //! Armv7E-M has them, Armv7-M and every other machine take the fallback with the same bits.

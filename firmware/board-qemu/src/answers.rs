@@ -1,9 +1,9 @@
 //! The hash of everything that the kernel answers, the same on every machine.
 
-use eel_kinematics::{Bounds, Direct, Pose, PoseError, Rotation, Wrist};
+use eel_kinematics::{Bounds, Direct, Policy, Pose, PoseError, Rotation, Wrist};
 use eel_units::{
-    Angle, AngularVelocity, Torque, arctangent, divide_q31, multiply_high, multiply_high_add,
-    root_q30,
+    Angle, AngularVelocity, Torque, arctangents, multiply_high, multiply_high_add, quotient_q30,
+    ratio_q30, root_near, root_q30,
 };
 
 /// How many poses are hashed.
@@ -84,7 +84,9 @@ fn add_primitives(hash: &mut Hash, x: i32, y: i32) {
     let (sine, cosine) = Angle::from_q29(x).sin_cos();
     hash.add_all([sine, cosine]);
     hash.add_all([multiply_high(x, y), multiply_high_add(y, x, y)]);
-    hash.add_all([root_q30(x as u32), arctangent(x), divide_q31(x >> 2, y)]);
+    hash.add_all([root_q30(x as u32), root_near(y), ratio_q30(x, y)]);
+    hash.add_all(arctangents([x, y]));
+    hash.add(quotient_q30(x >> 2, y));
     hash.add(Angle::from_sides(y, x).to_q29());
 }
 
@@ -102,7 +104,7 @@ fn add_direct(hash: &mut Hash, direct: &Direct, bits: [i32; 3]) {
         low: Torque::from_q24(-(1 << 25)),
         high: Torque::from_q24(1 << 26),
     }; 3];
-    let shared = jacobian.share(moment, &bounds);
+    let shared = jacobian.share(&moment, &bounds, Policy::YawFirst);
     hash.add_all(shared.torque.map(Torque::to_q24));
     hash.add_all(shared.achieved.map(Torque::to_q24));
     hash.add_all(jacobian.torques(moment).map(Torque::to_q24));

@@ -23,8 +23,6 @@ pub struct Leg {
 pub struct Inverse {
     /// The motors' angles in radians.
     pub joints: [f32; 3],
-    /// The columns of R.
-    pub columns: [[f32; 3]; 3],
     /// The lesser √D.
     pub margin: f32,
 }
@@ -57,15 +55,13 @@ pub fn inverse(legs: &[Leg; 2], pose: &[f32; 3]) -> Option<Inverse> {
     let columns = [
         [cp * cq, cy * sq + sy * spcq, sy * sq - cy * spcq],
         [-(cp * sq), cy * cq - sy * spsq, sy * cq + cy * spsq],
-        [sp, -(sy * cp), cy * cp],
     ];
-    let [first, second, _] = &columns;
+    let [first, second] = &columns;
     let (theta1, margin1) = legs[0].inverse(first)?;
     let (theta2, margin2) = legs[1].inverse(second)?;
     let third = atanf((first[1] - first[0]) / (first[1] + first[0]));
     Some(Inverse {
         joints: [theta1, theta2, QUARTER_TURN_HALF + third],
-        columns,
         margin: margin1.min(margin2),
     })
 }

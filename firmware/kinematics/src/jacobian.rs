@@ -4,115 +4,130 @@
 //! Qc) and (0, 0, 1), the first two over the crank's length: triangular, so that τ takes two
 //! divisions, none of them by B, and det A = ρ1 ρ2 W1 W2.
 
-use eel_units::{AngularVelocity, Reciprocal, Torque, round_shift, round_shift_saturating};
+use eel_units::{
+    AngularVelocity, Torque, multiply_high, ratio_q30, round_shift_saturating, saturate,
+};
 
-use crate::vector::{Vector, dot};
+use crate::vector::{Vector, add_cross, dot, high, wide};
 
-/// A, B and det A at one configuration of the wrist, and the map of torques made from them.
+/// The Jacobian at one configuration of the wrist: J = A⁻¹ B and its transpose, the map of torques.
 ///
 /// Row 3 of A is the exact one, z'', with B₃₃ = cos φ; the paper's printed [0 0 1] holds at φ = 0
 /// only (`tests/errata.rs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Jacobian {
-    /// The basis x'', y', z'', Q30.
-    basis: [Vector; 3],
-    /// The assembly margins W1 and W2, Q30.
-    margins: [i32; 2],
-    /// P, Q29.
-    across: i32,
-    /// Qs and Qc, Q29.
-    along: [i32; 2],
-    /// (l×r)·i over ρ for the legs, and cos φ, Q29.
-    serial: [i32; 3],
     /// det A, Q30.
     determinant: i32,
-    /// The rows of B A⁻ᵀ, Q27, one per motor.
+    /// The rows of B A⁻ᵀ = Jᵀ, Q26, one per motor.
     torque: [Vector; 3],
 }
 
-impl Jacobian {
-    /// Makes it from its parts; nothing where a torque would exceed eight times the moment.
+/// The axes of the serial leg.
+pub(crate) struct Basis {
+    /// x'', Q30.
+    pub x: Vector,
+    /// The first two of y', Q31; the third is zero.
+    pub y: [i32; 2],
+    /// Its opposite.
+    pub minus_y: [i32; 2],
+    /// z'', Q31; its third is cos φ = B₃₃.
+    pub z: Vector,
+}
+
+/// Leg 1's part in the map of torques.
+pub(crate) struct First {
+    /// b1 / W1, Q28, up to 1.5.
+    gear: i32,
+    /// −P / W1, Q30, within ±2.
+    lean: i32,
+}
+
+/// Leg 2's part in the map of torques.
+pub(crate) struct Second {
+    /// b2 / W2, Q28, up to 1.5.
+    gear: i32,
+    /// −Qs / W2, Q30, within ±2.
+    skew: i32,
+    /// −Qc / W2, Q28, within ±2.
+    lean: i32,
+}
+
+/// Returns 1 / W, at most 4/3, in Q30, for W in Q29 from ¾ to 1.5.
+#[inline(always)]
+fn invert(margin: i32) -> i32 {
+    ratio_q30(1 << 28, margin) << 1
+}
+
+impl First {
+    /// Makes it from W1 (Q29), (l×r)·i / ρ and −P (Q30).
     #[inline(always)]
-    pub(crate) fn new(
-        basis: [Vector; 3],
-        margins: [i32; 2],
-        across: i32,
-        along: [i32; 2],
-        serial: [i32; 3],
-        cranks: i32,
-    ) -> Option<Self> {
-        let [x, y, z] = &basis;
-        // W > ½: one over it is below 2, in Q30.
-        let [inverse1, inverse2] =
-            margins.map(|margin| i64::from(Reciprocal::new(margin).to_q30()));
-        let mut torque = [[0; 3]; 3];
-        let mut excess = 0;
-        for axis in 0..3 {
-            // Aᵀλ = M for a unit moment about this axis of the base.
-            let lambda2 = i64::from(round_shift::<30>(i64::from(x[axis]) * inverse2)); // Q30
-            // Below 7 in Q28; over W below 14, and cut to 8 with the answer as a whole.
-            let sum = (i64::from(y[axis]) << 29) + i64::from(along[0]) * lambda2; // Q59
-            let sum = i64::from(round_shift::<31>(sum));
-            let lambda1 = -((sum * inverse1 + (1 << 29)) >> 30);
-            let sum = (i64::from(z[axis]) << 27) // Q57
-                + i64::from(across) * lambda1
-                - ((i64::from(along[1]) * lambda2) >> 2);
-            let lambda3 = (sum + (1 << 29)) >> 30; // Q27
-            // λ1 in Q28 and λ3 in Q27, each below 8.
-            excess |= (lambda1.abs() >> 31) | (lambda3.abs() >> 30);
-            torque[0][axis] = round_shift::<30>(i64::from(serial[0]) * lambda1);
-            torque[1][axis] = round_shift::<32>(i64::from(serial[1]) * lambda2);
-            torque[2][axis] = round_shift::<29>(i64::from(serial[2]) * lambda3);
+    pub fn new(margin: i32, serial: i32, across: i32) -> Self {
+        let inverse = invert(margin);
+        Self {
+            gear: multiply_high(serial, inverse),
+            lean: multiply_high(across, inverse) << 2,
         }
-        if excess != 0 {
-            return None;
+    }
+}
+
+impl Second {
+    /// Makes it from W2 (Q29), (l×r)·i / ρ (Q30), −Qs and −Qc (Q29).
+    #[inline(always)]
+    pub fn new(margin: i32, serial: i32, along: [i32; 2]) -> Self {
+        let inverse = invert(margin);
+        let [sine, cosine] = along;
+        Self {
+            gear: multiply_high(serial, inverse),
+            skew: multiply_high(sine, inverse) << 3,
+            lean: multiply_high(cosine, inverse) << 1,
         }
-        let both = round_shift::<31>(i64::from(margins[0]) * i64::from(margins[1])); // Q29
-        let determinant = round_shift::<29>(i64::from(both) * i64::from(cranks));
-        Some(Self {
-            basis,
-            margins,
-            across,
-            along,
-            serial,
+    }
+}
+
+impl Jacobian {
+    /// Makes the map of torques.
+    ///
+    /// Aᵀλ = M in the basis, then τ = B λ: τ1 = −b1/W1 (Qs/W2 Mx + My), τ2 = b2/W2 Mx,
+    /// τ3 = cos φ (Mz − P/W1 My − (P Qs/W1 + Qc)/W2 Mx). Every factor is below 5, in Q28.
+    #[inline(always)]
+    pub(crate) fn new(basis: &Basis, first: &First, second: &Second, determinant: i32) -> Self {
+        let Basis { x, y, minus_y, z } = basis;
+        let ex = multiply_high(first.gear, second.skew) << 2;
+        let ey = first.gear >> 1; // Q27, for −y in Q31
+        let sum = second.lean - multiply_high(first.lean, second.skew);
+        let gx = multiply_high(z[2], sum) << 1;
+        let gy = multiply_high(z[2], first.lean) >> 2; // Q27
+        let gz = z[2] >> 4; // Q27
+        Self {
             determinant,
-            torque,
-        })
+            torque: [
+                [
+                    high(wide(ex, x[0]) + wide(ey, minus_y[0])),
+                    high(wide(ex, x[1]) + wide(ey, minus_y[1])),
+                    multiply_high(ex, x[2]),
+                ],
+                x.map(|component| multiply_high(second.gear, component)),
+                [
+                    high(wide(gx, x[0]) + wide(gy, y[0]) + wide(gz, z[0])),
+                    high(wide(gx, x[1]) + wide(gy, y[1]) + wide(gz, z[1])),
+                    high(wide(gx, x[2]) + wide(gz, z[2])),
+                ],
+            ],
+        }
     }
 
-    /// Returns det A in Q30: 1 at home, at least 0.674 in the paper's workspace.
+    /// Returns the parallel margin det A in Q30: 1 at home, at least 0.674 in the paper's workspace.
     #[inline]
     pub const fn det_a(&self) -> i32 {
         self.determinant
     }
 
-    /// Returns the rows of B A⁻ᵀ in Q27, one per motor: torque for a unit moment about x, y, z.
+    /// Returns the rows of B A⁻ᵀ in Q26, one per motor: torque for a unit moment about x, y, z.
     ///
-    /// Each number is wrong by at most 2 parts in 10⁸ and within ±8.5.
+    /// Each number is wrong by at most 1 part in 10⁷ and within ±5.
     #[inline]
     pub const fn torque_rows(&self) -> &[[i32; 3]; 3] {
         &self.torque
-    }
-
-    /// Returns the motors' rates for an angular velocity of the platform: θ̇ = B⁻¹ A ω.
-    ///
-    /// A rate beyond ±128 rad/s saturates.
-    pub fn motor_rates(&self, omega: [AngularVelocity; 3]) -> [AngularVelocity; 3] {
-        let omega = omega.map(AngularVelocity::to_q24);
-        let [x, y, z] = self
-            .basis
-            .map(|axis| i64::from(round_shift_saturating::<30>(dot(&axis, &omega))));
-        let [w1, w2] = self.margins.map(i64::from);
-        let [sine, cosine] = self.along.map(i64::from);
-        // Q53: every factor of Q29 is below 2³⁰·⁶, so that three products fit.
-        let first = -((w1 * y) >> 1) - i64::from(self.across) * z;
-        let second = ((w2 * x) >> 1) - sine * y + cosine * z;
-        let rates = [
-            round_shift_saturating::<29>(first),
-            round_shift_saturating::<29>(second),
-            z as i32,
-        ];
-        self.over_serial(rates).map(AngularVelocity::from_q24)
     }
 
     /// Returns the platform's angular velocity for the motors' rates: ω = A⁻¹ B θ̇.
@@ -121,11 +136,17 @@ impl Jacobian {
     /// saturates.
     pub fn angular_velocity(&self, rates: [AngularVelocity; 3]) -> [AngularVelocity; 3] {
         let rates = rates.map(AngularVelocity::to_q24);
-        let [first, second, third] = &self.torque;
-        [0, 1, 2].map(|axis| {
-            let column = [first[axis], second[axis], third[axis]];
-            AngularVelocity::from_q24(round_shift_saturating::<27>(dot(&column, &rates)))
+        self.columns().map(|column| {
+            AngularVelocity::from_q24(round_shift_saturating::<26>(dot(&column, &rates)))
         })
+    }
+
+    /// Returns the motors' rates for an angular velocity of the platform: θ̇ = B⁻¹ A ω.
+    ///
+    /// Wrong by at most 6 parts in 10⁷ of the largest component in the paper's workspace; a rate beyond
+    /// ±128 rad/s saturates.
+    pub fn motor_rates(&self, omega: [AngularVelocity; 3]) -> [AngularVelocity; 3] {
+        solve(&self.columns(), omega.map(AngularVelocity::to_q24)).map(AngularVelocity::from_q24)
     }
 
     /// Returns the motors' torques for a moment on the platform: τ = B A⁻ᵀ M, without bounds.
@@ -134,37 +155,44 @@ impl Jacobian {
     pub fn torques(&self, moment: [Torque; 3]) -> [Torque; 3] {
         let moment = moment.map(Torque::to_q24);
         self.torque
-            .map(|row| Torque::from_q24(round_shift_saturating::<27>(dot(&row, &moment))))
+            .map(|row| Torque::from_q24(round_shift_saturating::<26>(dot(&row, &moment))))
     }
 
     /// Returns the moment on the platform for the motors' torques: M = Aᵀ B⁻¹ τ.
     ///
-    /// A component beyond ±128 N·m saturates.
+    /// Wrong by at most 6 parts in 10⁷ of the largest torque in the paper's workspace; a component beyond
+    /// ±128 N·m saturates.
     pub fn moment(&self, torques: [Torque; 3]) -> [Torque; 3] {
-        let [first, second, third] = self.over_serial(torques.map(Torque::to_q24)).map(i64::from);
-        let [w1, w2] = self.margins.map(i64::from);
-        let [sine, cosine] = self.along.map(i64::from);
-        let parts = [
-            round_shift_saturating::<30>(w2 * second),
-            round_shift_saturating::<29>(-((w1 * first) >> 1) - sine * second),
-            round_shift_saturating::<29>(
-                cosine * second - i64::from(self.across) * first + (third << 29),
-            ),
-        ];
-        let [x, y, z] = &self.basis;
-        [0, 1, 2].map(|axis| {
-            let row = [x[axis], y[axis], z[axis]];
-            Torque::from_q24(round_shift_saturating::<30>(dot(&row, &parts)))
-        })
+        solve(&self.torque, torques.map(Torque::to_q24)).map(Torque::from_q24)
     }
 
-    /// Divides by the diagonal of B; each entry is at least ⅛.
-    fn over_serial(&self, numbers: Vector) -> Vector {
-        let [a, b, c] = self.serial.map(Reciprocal::new);
-        [
-            a.times_over_q29(numbers[0]),
-            b.times_over_q29(numbers[1]),
-            c.times_over_q29(numbers[2]),
-        ]
+    /// Returns the columns of the map of torques, which are the rows of J.
+    fn columns(&self) -> [Vector; 3] {
+        let [a, b, c] = &self.torque;
+        [0, 1, 2].map(|axis| [a[axis], b[axis], c[axis]])
     }
+}
+
+/// Solves a small system with rows in Q26, each number within ±5, by Cramer's rule; saturates.
+///
+/// For reports and tests, not for the control tick: it divides 64 bits by 64.
+fn solve(rows: &[Vector; 3], right: Vector) -> Vector {
+    let [a, b, c] = rows;
+    // Q52 to Q24: each number is within ±50.
+    let cross = |one: &Vector, other: &Vector| {
+        let mut product = [0; 3];
+        add_cross(&mut product, one, other);
+        product.map(|component| (component + (1 << 27)) >> 28)
+    };
+    let crosses = [cross(b, c), cross(c, a), cross(a, b)];
+    let determinant = a.iter().zip(&crosses[0]).map(|(a, b)| i64::from(*a) * b);
+    let determinant = (determinant.sum::<i64>() + (1 << 25)) >> 26; // Q24
+    [0, 1, 2].map(|axis| {
+        let parts = crosses.iter().zip(right);
+        // Q48, within 2⁶³.
+        let sum: i64 = parts
+            .map(|(cross, right)| cross[axis] * i64::from(right))
+            .sum();
+        saturate(sum.checked_div(determinant).unwrap_or(i64::MAX))
+    })
 }

@@ -34,5 +34,5 @@ pub use inverse::Inverse;
 pub use jacobian::Jacobian;
 pub use pose::{Joints, Pose, PoseError};
 pub use rotation::Rotation;
-pub use share::{Bounds, Shared, Side};
+pub use share::{Bounds, Policy, Shared, Side};
 pub use wrist::Wrist;

@@ -3,7 +3,7 @@
 use eel_units::{Angle, angle_over_sine, round_shift, saturate};
 
 use crate::pose::Pose;
-use crate::vector::{ROOT_HALF_Q30, Vector, add_cross, dot, times, times_minus, times_plus};
+use crate::vector::{Vector, add_cross, dot, over_root_two, times, times_minus, times_plus};
 
 /// The platform's orientation: the columns of R in Q30, each a unit vector to 3 parts in 10⁹.
 ///
@@ -24,26 +24,14 @@ impl Rotation {
         &self.columns
     }
 
-    /// Makes the orientation of a pose, any pose; each number wrong by at most 5 parts in 10⁹.
+    /// Makes the orientation of a pose, any pose; each number wrong by at most 8 parts in 10⁹.
     pub fn from_pose(pose: &Pose) -> Self {
-        Self::from_sines(
-            pose.yaw.sin_cos(),
-            pose.pitch.sin_cos(),
-            pose.roll.sin_cos(),
-        )
-    }
-
-    /// Makes the orientation from (sine, cosine) of yaw, pitch and roll, in Q30.
-    #[inline(always)]
-    pub(crate) fn from_sines(
-        (sy, cy): (i32, i32),
-        (sp, cp): (i32, i32),
-        (sr, cr): (i32, i32),
-    ) -> Self {
-        // Sine and cosine of roll + π/4, straight from the products: one rounding.
-        let half = ROOT_HALF_Q30;
-        let cq = times_minus(cr, half, sr, half);
-        let sq = times_plus(cr, half, sr, half);
+        let (sy, cy) = pose.yaw.sin_cos();
+        let (sp, cp) = pose.pitch.sin_cos();
+        let (sr, cr) = pose.roll.sin_cos();
+        // Sine and cosine of roll + π/4.
+        let cq = over_root_two(cr - sr);
+        let sq = over_root_two(cr + sr);
         // Ry Rz, the rows that Rx will turn, and Rx.
         let spcq = times(sp, cq);
         let spsq = times(sp, sq);

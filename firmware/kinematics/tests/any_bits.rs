@@ -5,7 +5,7 @@ mod common;
 
 use common::{Q29, Random, angle_between, exact_joints, exact_rotation, matrix, radians};
 use eel_kinematics::design::Geometry;
-use eel_kinematics::{Bounds, Joints, Pose, Rotation, Wrist};
+use eel_kinematics::{Bounds, Joints, Policy, Pose, Rotation, Wrist};
 use eel_units::{Angle, AngularVelocity, Torque};
 
 /// Bits of every magnitude: full range, the kernel's range, corners.
@@ -124,7 +124,7 @@ fn maps_and_sharing_survive_every_input() {
             low: Torque::from_q24(bits(&mut random)),
             high: Torque::from_q24(bits(&mut random)),
         });
-        let shared = jacobian.share(moment, &bounds);
+        let shared = jacobian.share(&moment, &bounds, Policy::YawFirst);
         for (torque, bound) in shared.torque.iter().zip(&bounds) {
             assert!(
                 *torque >= bound.low.min(Torque::ZERO),
@@ -151,12 +151,12 @@ fn poses_and_orientations_survive_every_input() {
         let pose = Pose { yaw, pitch, roll };
         let rotation = Rotation::from_pose(&pose);
         let exact = exact_rotation(&pose);
-        assert!((matrix(&rotation) - exact).amax() <= 5e-9);
+        assert!((matrix(&rotation) - exact).amax() <= 8e-9);
         let _ = pose.angular_velocity(three(&mut random).map(AngularVelocity::from_q24));
         let back = rotation.to_pose();
         if back.pitch.abs() < Angle::from_milliradians(1_000) {
             let turned = matrix(&Rotation::from_pose(&back));
-            assert!((turned - exact).amax() <= 16e-9, "{pose:?} {back:?}");
+            assert!((turned - exact).amax() <= 24e-9, "{pose:?} {back:?}");
         }
         let error = previous.error_to(&rotation);
         assert!(

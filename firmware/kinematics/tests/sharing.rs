@@ -5,7 +5,7 @@ mod common;
 
 use common::{Random, exact_joints, newton_metres, pose_of, torque};
 use eel_kinematics::design::{Geometry, Matrix3, Vector3};
-use eel_kinematics::{Bounds, Jacobian, Joints, Shared, Side, Wrist};
+use eel_kinematics::{Bounds, Jacobian, Joints, Policy, Shared, Side, Wrist};
 use eel_units::Torque;
 
 /// What the kernel may pass a bound by, in N·m.
@@ -65,7 +65,8 @@ impl Case {
             low: torque(low),
             high: torque(high),
         });
-        self.jacobian.share(self.moment.map(torque), &bounds)
+        self.jacobian
+            .share(&self.moment.map(torque), &bounds, Policy::YawFirst)
     }
 
     fn clipped(&self) -> Vector3<f64> {
@@ -197,7 +198,11 @@ fn yaw_is_served_before_pitch_and_pitch_before_roll() {
         high: torque(1.0),
     }; 3];
     // At home τ1 = (yaw − pitch)/2, τ2 = (yaw + pitch)/2, τ3 = roll.
-    let shared = jacobian.share([torque(1.5), torque(1.5), torque(3.0)], &bounds);
+    let shared = jacobian.share(
+        &[torque(1.5), torque(1.5), torque(3.0)],
+        &bounds,
+        Policy::YawFirst,
+    );
     let achieved = shared.achieved.map(newton_metres);
     for (found, wanted) in achieved.into_iter().zip([1.5, 0.5, 1.0]) {
         assert!((found - wanted).abs() < 4e-6, "{achieved:?}");
@@ -216,7 +221,11 @@ fn a_motor_that_may_not_move_stops_what_needs_it() {
         low: Torque::ZERO,
         high: Torque::ZERO,
     };
-    let shared = jacobian.share([torque(1.0), torque(0.0), torque(0.5)], &[dead, free, free]);
+    let shared = jacobian.share(
+        &[torque(1.0), torque(0.0), torque(0.5)],
+        &[dead, free, free],
+        Policy::YawFirst,
+    );
     assert!(newton_metres(shared.achieved[0]).abs() < 4e-6);
     assert!((newton_metres(shared.achieved[2]) - 0.5).abs() < 1e-6);
     assert_eq!(shared.bound[0], Some(Side::High));
@@ -233,11 +242,12 @@ fn bounds_that_exclude_zero_or_cross_count_as_zero_on_that_side() {
         low: torque(0.5),
         high: torque(-0.5),
     };
-    let still = jacobian.share([Torque::ZERO; 3], &[odd, odd, crossed]);
+    let still = jacobian.share(&[Torque::ZERO; 3], &[odd, odd, crossed], Policy::YawFirst);
     assert_eq!(still.torque, [Torque::ZERO; 3]);
     let shared = jacobian.share(
-        [torque(1.0), Torque::ZERO, torque(1.0)],
+        &[torque(1.0), Torque::ZERO, torque(1.0)],
         &[odd, odd, crossed],
+        Policy::YawFirst,
     );
     assert!((newton_metres(shared.torque[0]) - 0.5).abs() < 2e-7);
     assert_eq!(shared.torque[2], Torque::ZERO);

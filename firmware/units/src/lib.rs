@@ -5,7 +5,7 @@
 //! The functions state their error, and the tests hold them to it.
 //! What is deliberately absent: floats, clocks, and quantities that no firmware crate uses.
 //!
-//! `unsafe` is denied, not forbidden, for two multiply instructions in `multiply.rs`.
+//! `unsafe` is denied, not forbidden, for two divide instructions in `machine.rs`.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
@@ -13,16 +13,15 @@
 mod arithmetic;
 #[rustfmt::skip]
 mod coefficients;
-mod multiply;
+mod machine;
 mod quantity;
 mod time;
 mod trigonometry;
 
 pub use arithmetic::{
-    Reciprocal, divide_q31, invert_normal, root_q30, round_shift, round_shift_saturating, saturate,
-    shift_left_high,
+    quotient_q30, ratio_q30, root_near, root_q30, round_shift, round_shift_saturating, saturate,
 };
-pub use multiply::{multiply_high, multiply_high_add};
+pub use machine::{multiply_high, multiply_high_add};
 pub use quantity::{Angle, AngularVelocity, Current, Duty, Temperature, Torque, Voltage};
 pub use time::{Duration, Instant};
-pub use trigonometry::{SIN_COS_NEAR, angle_over_sine, arctangent, sin_cos_near};
+pub use trigonometry::{angle_over_sine, arctangents, sin_cos_near};

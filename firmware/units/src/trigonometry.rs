@@ -1,74 +1,75 @@
 //! Sine, cosine and arctangent in fixed point, each with its error.
 
 use crate::Angle;
-use crate::arithmetic::divide_q31;
-use crate::coefficients::{ANGLE_OVER_SINE, ARCTANGENT, COSINE, SINE};
-use crate::multiply::{multiply_high, multiply_high_add};
+use crate::arithmetic::quotient_q30;
+use crate::machine::{coefficients, multiply_high, multiply_high_add};
 
-/// The largest magnitude for [`sin_cos_near`]: 1.125 rad.
-pub const SIN_COS_NEAR: Angle = Angle::from_q29(603_979_776);
-
-/// Returns sine and cosine in Q30 of an angle within ±1.125 rad, wrong by at most 1.5e-9 each.
+/// Returns sine and cosine in Q30 of angles within −1..1 rad, wrong by at most 2.8e-9 each.
 ///
-/// Beyond that range the answer is meaningless (and no more than that); [`Angle::sin_cos`] takes
-/// every angle.
+/// Neither passes 2³⁰ − 1. Beyond that range the answer is meaningless (and no more than that);
+/// [`Angle::sin_cos`] takes every angle. All angles go through the polynomial together, so that each
+/// coefficient is loaded once.
 #[inline(always)]
-pub fn sin_cos_near(angle: Angle) -> (i32, i32) {
-    sin_cos_q30(angle.to_q29() << 1)
+pub fn sin_cos_near<const N: usize>(angles: [Angle; N]) -> [(i32, i32); N] {
+    sin_cos_q31(angles.map(|angle| angle.to_q29() << 2))
 }
 
-/// Sine and cosine in Q30 of an angle in Q30, within ±1.125 rad.
+/// Sine and cosine in Q30 of angles in Q31 radians.
 #[inline(always)]
-fn sin_cos_q30(angle: i32) -> (i32, i32) {
-    // w = a²/4 in Q32.
-    let w = ((angle as i64 * angle as i64 + (1 << 29)) >> 30) as i32;
-    let [s0, s1, s2, s3] = SINE;
-    let sine = multiply_high_add(
-        s0,
-        multiply_high_add(s1, multiply_high_add(s2, s3, w), w),
-        w,
-    );
-    // S · w in Q32: within −0.2..0.
-    let sine = multiply_high_add(angle, angle, multiply_high(sine, w) << 1);
-    let [c0, c1, c2, c3, c4] = COSINE;
-    let cosine = multiply_high_add(c2, multiply_high_add(c3, c4, w), w);
-    let cosine = multiply_high_add(c0, multiply_high_add(c1, cosine, w), w);
-    (sine, multiply_high_add(1 << 30, cosine, w))
-}
-
-/// Returns the arctangent in Q30 radians of a Q31 tangent within ±0.625, wrong by at most 1.2e-9.
-///
-/// The same integer read in Q29 is twice the arctangent. Beyond the range the error grows, to
-/// 0.01 rad at ±1.
-#[inline(always)]
-pub fn arctangent(tangent: i32) -> i32 {
-    // u = t² in Q32; from √½ up it would pass the sign bit, so that it stops there.
-    let square = (tangent as i64 * tangent as i64 + (1 << 29)) >> 30;
-    let u = if square > i32::MAX as i64 {
-        i32::MAX
-    } else {
-        square as i32
+fn sin_cos_q31<const N: usize>(angles: [i32; N]) -> [(i32, i32); N] {
+    let table = coefficients();
+    let [s0, s1, s2, s3, s4] = table.sine;
+    let [c1, c2, c3, c4] = table.cosine;
+    // a² in Q30.
+    let squares = angles.map(|angle| multiply_high(angle, angle));
+    let step = |sums: [i32; N], coefficient: i32| -> [i32; N] {
+        core::array::from_fn(|k| multiply_high_add(coefficient, sums[k], squares[k]))
     };
-    let [c0, c1, c2, c3, c4, c5, c6] = ARCTANGENT;
-    let p = multiply_high_add(c4, multiply_high_add(c5, c6, u), u);
-    let p = multiply_high_add(c2, multiply_high_add(c3, p, u), u);
-    let p = multiply_high_add(c0, multiply_high_add(c1, p, u), u);
-    // P · u in Q32: within −0.34..0.
-    let q31 = multiply_high_add(tangent, tangent, multiply_high(p, u) << 1);
-    (q31 >> 1).wrapping_add(q31 & 1)
+    let sums = step([s4; N], s3);
+    let sums = step(sums, s2);
+    let sums = step(sums, s1);
+    let sums = step(sums, s0);
+    let sines: [i32; N] = core::array::from_fn(|k| multiply_high(angles[k], sums[k]));
+    let sums = step([c4; N], c3);
+    let sums = step(sums, c2);
+    let sums = step(sums, c1);
+    // One step below one, so that twice the cosine is a number too.
+    let cosines = step(sums, (1 << 30) - 1);
+    core::array::from_fn(|k| (sines[k], cosines[k]))
+}
+
+/// Returns the arctangents in Q30 radians of Q31 tangents within ±17/32, wrong by at most 1.4e-9.
+///
+/// The same integer read in Q29 is twice the arctangent. Beyond the range the answer is meaningless, and
+/// no more than that.
+#[inline(always)]
+pub fn arctangents<const N: usize>(tangents: [i32; N]) -> [i32; N] {
+    let [p0, p1, p2, p3, p4, p5, p6] = coefficients().arctangent;
+    // (2t)² in Q30.
+    let squares = tangents.map(|tangent| multiply_high(tangent, tangent) << 2);
+    let step = |sums: [i32; N], coefficient: i32| -> [i32; N] {
+        core::array::from_fn(|k| multiply_high_add(coefficient, sums[k], squares[k]))
+    };
+    let sums = step([p6; N], p5);
+    let sums = step(sums, p4);
+    let sums = step(sums, p3);
+    let sums = step(sums, p2);
+    let sums = step(sums, p1);
+    let sums = step(sums, p0);
+    core::array::from_fn(|k| multiply_high(tangents[k], sums[k]))
 }
 
 impl Angle {
-    /// Returns sine and cosine in Q30, wrong by at most 2 parts in 10⁹ each, for every angle.
+    /// Returns sine and cosine in Q30, wrong by at most 3 parts in 10⁹ each, for every angle.
     #[inline]
     pub fn sin_cos(self) -> (i32, i32) {
         const TWO_OVER_PI_Q31: i32 = 1_367_130_551;
-        const HALF_PI_Q30: i32 = 1_686_629_713;
+        const HALF_PI_Q31: u32 = 3_373_259_426;
         // The nearest quarter turn, −3..=3.
         let quarters = (multiply_high(self.to_q29(), TWO_OVER_PI_Q31) + (1 << 27)) >> 28;
-        // Modulo 2³²: the true difference is within ±0.79 rad, which Q30 holds.
-        let rest = (self.to_q29() << 1).wrapping_sub(quarters.wrapping_mul(HALF_PI_Q30));
-        let (sine, cosine) = sin_cos_q30(rest);
+        // Modulo 2³²: the true difference is within ±0.79 rad, which Q31 holds.
+        let rest = (self.to_q29() << 2).wrapping_sub(quarters.wrapping_mul(HALF_PI_Q31 as i32));
+        let [(sine, cosine)] = sin_cos_q31([rest]);
         match quarters & 3 {
             0 => (sine, cosine),
             1 => (cosine, -sine),
@@ -77,7 +78,7 @@ impl Angle {
         }
     }
 
-    /// Returns the angle of the vector (x, y), in −π..=π, wrong by at most 3.5 nrad.
+    /// Returns the angle of the vector (x, y), in −π..=π, wrong by at most 5 nrad.
     ///
     /// Any scale, any bits; short vectors are as exact as their own digits. (0, 0) gives zero.
     #[inline]
@@ -99,12 +100,14 @@ impl Angle {
             (small >> (2 - lead), big >> (2 - lead))
         };
         let (small, big) = (small as i32, big as i32);
+        // The tangent in Q31 is twice the quotient in Q30; the arctangent in Q30 has one bit more.
         let octant = if small > big >> 1 {
             // atan t = π/4 + atan((t − 1)/(t + 1)), within ±⅓.
-            let rest = arctangent(divide_q31(small - big, small + big));
+            let [rest] = arctangents([quotient_q30(small - big, (small + big) >> 1)]);
             Self::FRAC_PI_4.to_q29() + (rest >> 1)
         } else {
-            (arctangent(divide_q31(small, big)) + 1) >> 1
+            let [whole] = arctangents([quotient_q30(small << 1, big)]);
+            (whole + 1) >> 1
         };
         let quadrant = if height > width {
             Self::FRAC_PI_2.to_q29() - octant
@@ -134,7 +137,7 @@ pub fn angle_over_sine(cosine: i32) -> i32 {
     } else {
         (difference << 1) as i32
     };
-    let [c0, c1, c2, c3, c4, c5, c6] = ANGLE_OVER_SINE;
+    let [c0, c1, c2, c3, c4, c5, c6] = coefficients().angle_over_sine;
     let p = multiply_high_add(c4, multiply_high_add(c5, c6, h), h);
     let p = multiply_high_add(c2, multiply_high_add(c3, p, h), h);
     multiply_high_add(c0, multiply_high_add(c1, p, h), h)

@@ -1,7 +1,7 @@
 //! The vertebra behind its node: estimation, states, control, protection.
 
 use eel_canopen::EventQueue;
-use eel_kinematics::{Joints, Pose, PoseError};
+use eel_kinematics::{Joints, Policy, Pose, PoseError};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
 use eel_units::{Angle, Instant, Torque};
@@ -291,10 +291,11 @@ impl Core {
             command_cap,
         };
         let bounds: [MotorBounds; 3] = bounds(&self.settings.limits, &self.electrical, &situation);
-        let shared = motion
-            .direct
-            .jacobian
-            .share(moment, &bounds.each_ref().map(|motor| motor.torque));
+        let shared = motion.direct.jacobian.share(
+            &moment,
+            &bounds.each_ref().map(|motor| motor.torque),
+            Policy::YawFirst,
+        );
         self.achieved = shared.achieved;
         self.unallocated = shared.unallocated;
         let mut limit = [LimitCode::None; 3];

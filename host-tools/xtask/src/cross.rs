@@ -67,7 +67,10 @@ pub fn build_command_for(target: &str) -> Result<Command> {
     build.args(["--profile", "firmware", "--target", target]);
     // Of their own, or host and cross builds would make each other stale.
     build.arg("--target-dir").arg(cross_dir());
-    build.env(format!("CARGO_TARGET_{variable}_RUSTFLAGS"), rust_flags());
+    build.env(
+        format!("CARGO_TARGET_{variable}_RUSTFLAGS"),
+        rust_flags(target),
+    );
     for variable in [
         "RUSTFLAGS",
         "CARGO_ENCODED_RUSTFLAGS",
@@ -150,12 +153,22 @@ fn linker() -> Result<PathBuf> {
     }
 }
 
-/// Returns compiler flags that take the build's folders out of the image.
-fn rust_flags() -> String {
+/// Returns compiler flags for the processor that the target stands for, and such that take the
+/// build's folders out of the image.
+///
+/// LLVM's scheduler is off: it moves multiplications ahead of their use for a processor that would
+/// gain by it, and pays with a spilled register each. The order of the source is the better one.
+fn rust_flags(target: &str) -> String {
+    let processor = if target == CORTEX_M3 {
+        "cortex-m3"
+    } else {
+        "cortex-m4"
+    };
     let home = env::var("HOME").unwrap_or_else(|_| "/root".into());
     let cargo = env::var("CARGO_HOME").unwrap_or_else(|_| format!("{home}/.cargo"));
     format!(
-        "--remap-path-prefix={}=anguilla --remap-path-prefix={cargo}=cargo",
+        "-Ctarget-cpu={processor} -Cllvm-args=-enable-misched=false \
+         --remap-path-prefix={}=anguilla --remap-path-prefix={cargo}=cargo",
         clean_root().display()
     )
 }

@@ -1,10 +1,12 @@
 //! Making of the firmware's kernel from a unit's geometry.
 
+use core::f64::consts::FRAC_1_SQRT_2;
+
 use eel_units::Angle;
 use libm::{atan2, fabs, round};
 
 use super::{Geometry, Leg};
-use crate::wrist;
+use crate::wrist::{self, Pull, Push};
 
 /// How far each length and zero may be from the paper's: 2 % of the platform's arm (or of itself).
 const TOLERANCE: f64 = 0.02;
@@ -17,7 +19,7 @@ impl Geometry {
     pub fn kernel(&self) -> Option<wrist::Wrist> {
         let [ideal1, ideal2] = &Self::PARALLEL_ACTUATORS.legs;
         let [first, second] = &self.legs;
-        let cranks = fixed(first.crank * second.crank, 30)?;
+        let cranks = fixed(first.crank * second.crank, 31)?;
         Some(wrist::Wrist {
             legs: [first.kernel(ideal1)?, second.kernel(ideal2)?],
             cranks,
@@ -43,15 +45,28 @@ impl Leg {
         let slope = self.center / self.crank;
         let square = self.center.dot(&self.center) + self.crank * self.crank;
         let offset = (1.0 + square - self.rod * self.rod) / (2.0 * self.crank);
+        let [_, y, z] = self.center.into();
         Some(wrist::Leg {
-            center: [fixed(self.center[1], 29)?, fixed(self.center[2], 29)?],
-            slope: [
-                fixed(slope[0], 29)?,
-                fixed(slope[1], 29)?,
-                fixed(slope[2], 29)?,
-            ],
-            offset: fixed(offset, 29)?,
             zero: Angle::from_q29(fixed(zero, 29)?),
+            pull: Pull {
+                center: [fixed(y * FRAC_1_SQRT_2, 30)?, fixed(z * FRAC_1_SQRT_2, 30)?],
+                slope: [
+                    fixed(slope[0], 30)?,
+                    fixed(slope[1], 30)?,
+                    fixed(slope[2], 30)?,
+                ],
+                offset: fixed(offset * FRAC_1_SQRT_2, 30)?,
+            },
+            push: Push {
+                back: [
+                    fixed(-slope[0], 29)?,
+                    fixed(-slope[1], 29)?,
+                    fixed(-slope[2], 29)?,
+                ],
+                offset: fixed(offset, 29)?,
+                shift: [fixed(y, 31)?, fixed(1.0 + z, 31)?],
+                center: [fixed(y, 29)?, fixed(z, 29)?],
+            },
         })
     }
 }
