@@ -128,7 +128,7 @@ fn figure_12_has_its_four_platforms() {
     assert_close(&fk["phi"], &[-0.070_649], 1e-6);
     assert_close(&fk["psi"], &[0.141_301], 1e-6);
     let solutions = fk["solutions"].as_array().unwrap();
-    assert_eq!(solutions[0]["branch"], "home");
+    assert_eq!(solutions[0]["assembly_mode"], "home");
     let mut found: Vec<[f64; 2]> = solutions
         .iter()
         .map(|one| [one["phi"].as_f64().unwrap(), one["psi"].as_f64().unwrap()])

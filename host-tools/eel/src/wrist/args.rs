@@ -1,7 +1,7 @@
 //! The arguments of `eel wrist`.
 
 use clap::{Args, Subcommand, ValueEnum};
-use eel_kinematics::design::Geometry;
+use eel_kinematics::design::{AssemblyMode, Geometry, WorkingMode};
 use serde::Serialize;
 
 const AFTER: &str = "\
@@ -9,7 +9,9 @@ Angles are in radians (--degrees: all of them, in and out), moments and torques 
 frame: x dorsoventral, y lateral, z along the body. A pose is R = Rx(yaw) Ry(pitch) Rz(roll) Rz(π/4), or
 the paper's R = Rz(theta3) Ry(phi) Rx(psi). Home is yaw = pitch = roll = 0, theta = (0, 0, π/4).
 
-The home branch: (l×r)·i > 0 on both legs, det A > 0, cos phi > 0.
+Working modes name the inverse solutions by the signs of (l×r)·i on legs 1 and 2: ++ (home), +-, -+, --.
+Assembly modes name the direct ones: home (det A > 0), other-psi (det A < 0), and with leg 1's other phi
+other-phi (det A > 0) and other-both (det A < 0). The home branch is ++ and home, with cos phi > 0.
 
 Exit codes: 0 answered; 1 a claim that should hold does not (paper); 2 wrong usage, or no
 configuration answers.
@@ -22,15 +24,17 @@ Examples:
   eel wrist paper                                    what the paper says, and what is true";
 
 const IK_JSON: &str = "\
---json: architecture, kernel (who gave theta), unit, pose, theta (home branch), theta_f64, theta_fixed
-(null where the kernel does not answer; fixed_refusal says why), det_a, b, condition (of A),
-condition_of_rates (of B⁻¹A), margin (1 at home, 0 where a crank and its rod line up); with --all
-solutions (four, home first) and working_modes (signs of (l×r)·i on legs 1 and 2).";
+--json: architecture, kernel (who gave theta), unit, pose, working_mode, assembly_mode (null on a
+singularity), theta (in that working mode), theta_f64, theta_fixed (null where the kernel does not answer;
+fixed_refusal says why), det_a, b, condition (of A), condition_of_rates (of B⁻¹A), isotropy and
+isotropy_of_rates (their inverses), manipulability (|det A|) and manipulability_of_rates (of A⁻¹B), margin
+(1 at home, 0 where a crank and its rod line up), travel (within, and the limit with the least room:
+coordinate, side, room); with --all solutions (four, home first) and working_modes (their names).";
 
 const FK_JSON: &str = "\
---json: architecture, kernel (who gave the pose), unit, theta, phi, psi, yaw, pitch, roll, det_a,
-fixed and f64 (both answers), fixed_refusal, solutions (all that exist, home first, each with branch and
-det_a).";
+--json: architecture, kernel (who gave the pose), unit, theta, assembly_mode, phi, psi, yaw, pitch, roll,
+det_a, fixed and f64 (both answers), fixed_refusal, solutions (all that exist, home first, each with
+assembly_mode and det_a).";
 
 const JACOBIAN_JSON: &str = "\
 A ω = B θ̇ with rows of A: p1×r1, p2×r2, z''. Computed in double precision.
@@ -49,7 +53,9 @@ const MARGIN_JSON: &str = "\
 Each margin is 1 at home and 0 at its singularity, and varies continuously between.
 
 --json: architecture, kernel (who gave margin), margin (the lesser of serial 1 and 2), serial (legs 1
-and 2 by (l×r)·i over home's, leg 3 by cos phi), assembly (det A), least (of all four), fixed_refusal.";
+and 2 by (l×r)·i over home's, leg 3 by cos phi), assembly (det A over home's), depths (its two factors, by
+leg), least_singular (the least singular value of A), least (of serial and assembly; negative outside
+home's assembly mode), travel (within, and the limit with the least room), fixed_refusal.";
 
 /// The questions one can ask the wrist.
 #[derive(Debug, Args)]
@@ -104,7 +110,7 @@ pub enum Kernel {
 
 /// What all questions have in common.
 #[derive(Clone, Copy, Debug, Args)]
-pub struct Common {
+pub struct Subject {
     /// Which wrist
     #[arg(
         long,
@@ -113,15 +119,22 @@ pub struct Common {
         default_value = "parallel-actuators"
     )]
     pub architecture: Architecture,
-    /// Who answers [default: fixed where it can, else f64]
-    #[arg(long, value_enum, value_name = "KERNEL")]
-    pub kernel: Option<Kernel>,
     /// Angles in degrees, in and out
     #[arg(long)]
     pub degrees: bool,
     /// Write one JSON object (keys below)
     #[arg(long)]
     pub json: bool,
+}
+
+/// What the questions have in common that the firmware's kernel can answer.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Common {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Who answers [default: fixed where it can, else f64]
+    #[arg(long, value_enum, value_name = "KERNEL")]
+    pub kernel: Option<Kernel>,
 }
 
 /// A pose; angles that are left out are home's.
@@ -160,6 +173,9 @@ pub struct At {
 pub struct Ik {
     #[command(flatten)]
     pub at: At,
+    /// Which inverse solution: signs of (l×r)·i on legs 1 and 2, one of ++, +-, -+, --
+    #[arg(long, value_name = "SIGNS", default_value = "++", allow_hyphen_values = true, value_parser = working_mode)]
+    pub working_mode: WorkingMode,
     /// All four solutions too
     #[arg(long)]
     pub all: bool,
@@ -172,6 +188,9 @@ pub struct Fk {
     /// The three motor angles, as in 0.1,0.2,0.785
     #[arg(long, value_name = "A,B,C", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub theta: Vec<f64>,
+    /// Which direct solution: home, other-psi, other-phi, other-both
+    #[arg(long, value_name = "MODE", default_value = "home", value_parser = assembly_mode)]
+    pub assembly_mode: AssemblyMode,
     /// All solutions too (--json always has them)
     #[arg(long)]
     pub all: bool,
@@ -203,6 +222,23 @@ fn number(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|value: &f64| value.abs() <= 1e6);
     number.ok_or_else(|| "expected a number within ±1000000, such as 0.25 or -1e-3".to_owned())
+}
+
+fn working_mode(text: &str) -> Result<WorkingMode, String> {
+    let mut all = WorkingMode::ALL.into_iter();
+    let found = all.find(|mode| mode.name() == text);
+    found.ok_or_else(|| {
+        "expected the signs of (l×r)·i on legs 1 and 2: ++ (home), +-, -+ or --".to_owned()
+    })
+}
+
+fn assembly_mode(text: &str) -> Result<AssemblyMode, String> {
+    let mut all = AssemblyMode::ALL.into_iter();
+    let found = all.find(|mode| mode.name() == text);
+    found.ok_or_else(|| {
+        let names = AssemblyMode::ALL.map(AssemblyMode::name);
+        format!("expected one of {}", names.join(", "))
+    })
 }
 
 impl Architecture {

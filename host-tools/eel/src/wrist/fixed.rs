@@ -26,17 +26,22 @@ pub struct Choice<T> {
     pub refusal: Option<&'static str>,
 }
 
-/// Asks the kernel, as far as the architecture is its own, and decides who answers.
+/// Asks the kernel, as far as it knows the architecture and no other mode than home's is asked for, and
+/// decides who answers.
 pub fn choose<T>(
     common: &Common,
+    other_mode: Option<&str>,
     ask: impl FnOnce() -> Result<T, &'static str>,
 ) -> Result<Choice<T>> {
-    if common.architecture != Architecture::ParallelActuators {
+    let architecture = common.subject.architecture;
+    if architecture != Architecture::ParallelActuators || other_mode.is_some() {
         if common.kernel == Some(Kernel::Fixed) {
+            let beyond = match other_mode {
+                Some(mode) => format!("home's modes only, not {mode}"),
+                None => format!("parallel-actuators only, not {}", architecture.name()),
+            };
             return Err(refused(format!(
-                "the fixed-point kernel knows parallel-actuators only, not {}; leave --kernel out or \
-                 say --kernel f64",
-                common.architecture.name()
+                "the fixed-point kernel knows {beyond}; leave --kernel out or say --kernel f64"
             )));
         }
         return Ok(Choice {

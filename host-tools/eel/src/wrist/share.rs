@@ -52,23 +52,23 @@ pub fn run(out: &mut dyn Write, asked: &args::Torque) -> Result<()> {
         )));
     };
     let limits = limits(&asked.limits)?;
-    let place = Place::find(&asked.at, Unit::of(common))?;
+    let place = Place::find(&asked.at, Unit::of(&common.subject))?;
     let Some(map) = place.jacobians.torque_map() else {
         return Err(refused(
             "A is singular at this pose, no torques make a moment; move the pose a little",
         ));
     };
     let exact = share(&map, moment, limits);
-    let choice = fixed::choose(common, || {
+    let choice = fixed::choose(common, None, || {
         share_fixed(&fixed::at(place.pose)?, moment, limits)
     })?;
     let shared = match (&choice.fixed, choice.used) {
         (Some(shared), Kernel::Fixed) => shared,
         _ => &exact,
     };
-    if common.json {
+    if common.subject.json {
         let answer = Answer {
-            architecture: common.architecture,
+            architecture: common.subject.architecture,
             kernel: choice.used,
             tau: shared.tau,
             achieved: shared.achieved,
@@ -81,7 +81,7 @@ pub fn run(out: &mut dyn Write, asked: &args::Torque) -> Result<()> {
         serde_json::to_writer(&mut *out, &answer)?;
         return Ok(writeln!(out)?);
     }
-    writeln!(out, "{}, N·m", common.architecture.name())?;
+    writeln!(out, "{}, N·m", common.subject.architecture.name())?;
     writeln!(
         out,
         "               {:>14}{:>14}{:>14}",
