@@ -84,13 +84,22 @@ impl Geometry {
     /// Returns the least margin at an orientation in home's working mode, continuous also where a leg
     /// does not reach; nothing where the geometry does not reach its home.
     ///
-    /// Out of reach a serial margin is minus the root of what the leg lacks, ((l×r)·i)² being negative
-    /// there, and the crank points to where its end is nearest to where it should be.
+    /// Out of reach it is that of [`Geometry::nearest`], or minus the root of what the leg lacks if
+    /// that is less: ((l×r)·i)² over home's is negative there.
     pub fn least_margin(&self, orientation: &Matrix3<f64>) -> Option<f64> {
-        if let Some(theta) = self.inverse(orientation) {
-            return Some(self.margins(orientation, &theta)?.least());
+        let found = self.margins(orientation, &self.nearest(orientation))?;
+        if self.inverse(orientation).is_some() {
+            return Some(found.least());
         }
-        let third = atan2(orientation[(1, 0)], orientation[(0, 0)]);
+        let home = self.reach(&rotation(0.0, 0.0, 0.0));
+        let here = self.reach(orientation);
+        let lack = (-here[0] / home[0]).max(-here[1] / home[1]);
+        Some(found.least().min(-sqrt(lack.max(0.0))))
+    }
+
+    /// Returns the motors' angles for an orientation in home's working mode; where a leg does not
+    /// reach, the crank points to where its rod comes nearest to the platform.
+    pub fn nearest(&self, orientation: &Matrix3<f64>) -> [f64; 3] {
         let [first, second] = [0, 1].map(|leg| {
             let point = self.point(orientation, leg);
             let nearest = self.legs[leg].nearest(&point);
@@ -98,11 +107,8 @@ impl Geometry {
                 .inverse(&point)
                 .map_or(nearest, |both| both[0])
         });
-        let found = self.margins(orientation, &[first, second, third])?;
-        let home = self.reach(&rotation(0.0, 0.0, 0.0));
-        let here = self.reach(orientation);
-        let lack = (-here[0] / home[0]).max(-here[1] / home[1]);
-        Some(found.least().min(-sqrt(lack.max(0.0))))
+        let third = atan2(orientation[(1, 0)], orientation[(0, 0)]);
+        [first, second, third]
     }
 
     /// Returns how far a box of yaw, pitch and roll may grow about home before it meets a

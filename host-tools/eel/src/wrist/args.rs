@@ -57,6 +57,35 @@ and 2 by (l×r)·i over home's, leg 3 by cos phi), assembly (det A over home's),
 leg), least_singular (the least singular value of A), least (of serial and assembly; negative outside
 home's assembly mode), travel (within, and the limit with the least room), fixed_refusal.";
 
+const WORKSPACE_JSON: &str = "\
+Home's working mode. Hatched: a leg does not reach; grey: beyond a parallel singularity. On the terminal:
+the least margin and the worst condition number in the paper's box (yaw ±30°, pitch ±15°, roll ±4°), and how
+far the box may grow before it meets a singularity.
+
+--json: architecture, unit, roll, yaw and pitch (the grid's coordinates), of (for each measure its values,
+one row per pitch, null out of reach), reach (is it in reach), summary (box, least_margin and
+worst_condition with where they are, at this roll and at any roll of the box, largest_box: by how much the
+box may grow, global_isotropy and global_isotropy_of_rates: means over the box). No SVG is written with
+--json unless --out names a file.
+
+Examples:
+  eel wrist workspace                                          the prototype, to workspace.svg
+  eel wrist workspace --architecture orthogonal-axes --roll 4 --degrees --out map.svg
+  eel wrist workspace --of serial,parallel --yaw-range -90,90 --degrees --out - > map.svg";
+
+const DRAW_JSON: &str = "\
+A pose (home if none is given) is drawn in one working mode, motor angles (--theta) in one assembly mode;
+--all draws all four of either. Blue: leg 1; orange: leg 2; green: leg 3 and its axes z, y', x''.
+
+--json: unit, title, panels: architecture, working_mode, assembly_mode (null on a singularity), theta, phi,
+psi, yaw, pitch, roll, det_a, points (a, b, c of legs 1 and 2, in arms, in the base frame). No SVG is written
+with --json unless --out names a file.
+
+Examples:
+  eel wrist draw --yaw 20 --pitch -10 --degrees
+  eel wrist draw --theta 0.1,0.2,0.785398 --all --out solutions.svg
+  eel wrist draw --figure 13 --out - > figure-13.svg";
+
 /// The questions one can ask the wrist.
 #[derive(Debug, Args)]
 #[command(after_help = AFTER)]
@@ -82,6 +111,12 @@ pub enum Command {
     /// How far a pose is from each singularity
     #[command(after_help = MARGIN_JSON)]
     Margin(At),
+    /// A map of margin and conditioning over yaw and pitch, as SVG
+    #[command(after_help = WORKSPACE_JSON)]
+    Workspace(Workspace),
+    /// The mechanism in a pose, in all its solutions, or as a figure of the paper, as SVG
+    #[command(after_help = DRAW_JSON)]
+    Draw(Draw),
     /// Every claim of the paper: printed, computed, verdict, errata
     Paper(Paper),
 }
@@ -206,6 +241,101 @@ pub struct Torque {
     /// Torque bounds in N·m: LOW,HIGH for all motors, or three such pairs; LOW ≤ 0 ≤ HIGH
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
     pub limits: Vec<f64>,
+}
+
+/// What a map shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// The least margin: 1 at home, 0 at a singularity
+    Margin,
+    /// The least of the three serial margins
+    Serial,
+    /// The parallel margin, det A over home's
+    Parallel,
+    /// The inverse condition number of the rate map B⁻¹A
+    Isotropy,
+    /// The inverse condition number of A
+    IsotropyOfA,
+    /// The condition number of the rate map B⁻¹A
+    Condition,
+    /// The condition number of A
+    ConditionOfA,
+    /// Manipulability of the velocity map A⁻¹B, √det(J Jᵀ)
+    Manipulability,
+}
+
+#[derive(Debug, Args)]
+pub struct Workspace {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// The roll at which yaw and pitch are mapped
+    #[arg(long, value_name = "ANGLE", default_value = "0", allow_hyphen_values = true, value_parser = number)]
+    pub roll: f64,
+    /// Yaw from LOW to HIGH, or one number for both sides [default: ±75°]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
+    pub yaw_range: Vec<f64>,
+    /// Pitch from LOW to HIGH, or one number for both sides, within ±90° [default: ±50°]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, value_parser = number)]
+    pub pitch_range: Vec<f64>,
+    /// What is mapped, a panel each
+    #[arg(
+        long,
+        value_enum,
+        value_name = "MEASURE",
+        value_delimiter = ',',
+        default_value = "margin,isotropy"
+    )]
+    pub of: Vec<Measure>,
+    /// Cells of the grid along each axis
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(4..=2000))]
+    pub cells: u32,
+    /// Where the SVG goes, - for the terminal [default: workspace.svg]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<String>,
+}
+
+/// A figure of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Figure {
+    /// The first two architectures, parallel axes and orthogonal axes, at home
+    #[value(name = "4")]
+    Four,
+    /// The prototype, with parallel actuators, at home
+    #[value(name = "10")]
+    Ten,
+    /// The four direct solutions for theta = (0.1, 0.2, π/4)
+    #[value(name = "12")]
+    Twelve,
+    /// The four inverse solutions for (theta3, phi, psi) = (π/4, π/12, π/12)
+    #[value(name = "13")]
+    Thirteen,
+}
+
+#[derive(Debug, Args)]
+pub struct Draw {
+    #[command(flatten)]
+    pub subject: Subject,
+    #[command(flatten)]
+    pub pose: PoseArguments,
+    /// Three motor angles instead of a pose, as in 0.1,0.2,0.785
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',', allow_hyphen_values = true, value_parser = number, conflicts_with_all = ["yaw", "pitch", "roll", "theta3", "phi", "psi", "working_mode"])]
+    pub theta: Vec<f64>,
+    /// Which inverse solution of a pose: one of ++, +-, -+, --
+    #[arg(long, value_name = "SIGNS", default_value = "++", allow_hyphen_values = true, value_parser = working_mode)]
+    pub working_mode: WorkingMode,
+    /// Which direct solution for --theta: home, other-psi, other-phi, other-both
+    #[arg(long, value_name = "MODE", default_value = "home", value_parser = assembly_mode, requires = "theta")]
+    pub assembly_mode: AssemblyMode,
+    /// All solutions, a panel each
+    #[arg(long, conflicts_with_all = ["working_mode", "assembly_mode"])]
+    pub all: bool,
+    /// A figure of the paper
+    #[arg(long, value_enum, value_name = "NUMBER", conflicts_with_all = ["architecture", "yaw", "pitch", "roll", "theta3", "phi", "psi", "theta", "all", "working_mode", "assembly_mode"])]
+    pub figure: Option<Figure>,
+    /// Where the SVG goes, - for the terminal [default: wrist.svg]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<String>,
 }
 
 #[derive(Debug, Args)]
