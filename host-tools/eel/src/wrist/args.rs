@@ -21,6 +21,8 @@ Examples:
   eel wrist ik --theta3 0.7854 --phi 0.2618 --psi 0.2618 --all --json
   eel wrist fk --theta 0.1,0.2,0.785398 --all        the four platforms of Fig. 12
   eel wrist torque --moment 2,0.5,0 --limits -0.8,0.8
+  eel wrist workspace                                margin and conditioning over yaw and pitch
+  eel wrist draw --figure 12                         the same four, drawn
   eel wrist paper                                    what the paper says, and what is true";
 
 const IK_JSON: &str = "\
@@ -63,10 +65,10 @@ the least margin and the worst condition number in the paper's box (yaw ±30°, 
 far the box may grow before it meets a singularity.
 
 --json: architecture, unit, roll, yaw and pitch (the grid's coordinates), of (for each measure its values,
-one row per pitch, null out of reach), reach (is it in reach), summary (box, least_margin and
-worst_condition with where they are, at this roll and at any roll of the box, largest_box: by how much the
-box may grow, global_isotropy and global_isotropy_of_rates: means over the box). No SVG is written with
---json unless --out names a file.
+one row per pitch, null out of reach), reach (is it in reach), summary: box, at_roll and any_roll
+(least_margin and worst_condition, each with its value, null where infinite, yaw, pitch and roll),
+largest_box (by how much the box may grow), global_isotropy and global_isotropy_of_rates (means over the
+box). No SVG is written with --json unless --out names a file.
 
 Examples:
   eel wrist workspace                                          the prototype, to workspace.svg

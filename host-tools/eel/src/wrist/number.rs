@@ -74,6 +74,11 @@ pub fn plain(number: f64, places: usize) -> String {
     }
 }
 
+/// Returns a number as drawings have it: with a true minus sign.
+pub fn signed(number: f64, places: usize) -> String {
+    plain(number, places).replace('-', "−")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,5 +87,6 @@ mod tests {
     fn a_number_that_rounds_to_zero_has_no_sign() {
         assert_eq!(plain(-1e-12, 3), "0.000");
         assert_eq!(plain(-0.0015, 3), "-0.002");
+        assert_eq!(signed(-0.0015, 3), "−0.002");
     }
 }

@@ -3,7 +3,7 @@
 use eel_kinematics::design::{Range, Travel};
 
 use super::super::args::Measure;
-use super::super::number::plain;
+use super::super::number::signed;
 use super::super::svg::{Anchor, Point, Svg, path_data};
 use super::colour::viridis;
 use super::contour::{Line, simplified};
@@ -72,7 +72,7 @@ pub fn draw(map: &Map, heading: &Heading) -> String {
     // The same scale both ways, unless the ranges are too unlike.
     let scale = (MOST[0] / wide).min(MOST[1] / high);
     let size = [(wide * scale).max(180.0), (high * scale).max(140.0)];
-    let width = (LEFT + size[0] + RIGHT).max(640.0);
+    let width = (LEFT + size[0] + RIGHT).max(690.0);
     let each = ABOVE + size[1] + BELOW;
     let height = HEAD + each * map.values.len() as f64 + FOOT;
     let mut svg = Svg::new([width, height], &heading.title, &heading.subtitle, STYLE);
@@ -139,11 +139,14 @@ fn panel(svg: &mut Svg, map: &Map, index: usize, measure: Measure, plot: &Plot, 
     svg.path(&plot.lines(&map.clear.contour(0.0)), "edge", "");
     svg.path(&plot.lines(&map.reach.contour(0.0)), "edge", "");
     let corners = plot.paper();
-    for class in ["paper", "box"] {
-        svg.path(&[(corners.clone(), true)], class, "");
+    if !corners.is_empty() {
+        for class in ["paper", "box"] {
+            svg.path(&[(corners.clone(), true)], class, "");
+        }
     }
-    let [yaw, pitch] = heading.least;
-    svg.circle(plot.place([yaw, pitch]), 4.5, "least");
+    if plot.shows(heading.least) {
+        svg.circle(plot.place(heading.least), 4.5, "least");
+    }
     labels.write(svg);
     axes(svg, plot);
     legend(svg, plot, &scale, measure);
@@ -189,9 +192,18 @@ impl Plot {
         simple.filter(|(points, _)| points.len() > 1).collect()
     }
 
-    /// Returns the corners of the paper's box, as far as they are on the map.
+    /// Returns whether a pair of yaw and pitch in rad is on the map.
+    fn shows(&self, [yaw, pitch]: Point) -> bool {
+        self.yaw.contains(yaw) && self.pitch.contains(pitch)
+    }
+
+    /// Returns the corners of the paper's box, as far as it is on the map; none where it is beside it.
     fn paper(&self) -> Vec<Point> {
         let [yaw, pitch, _] = Travel::PAPER;
+        let is_beside = |one: &Range, other: &Range| one.low >= other.high || one.high <= other.low;
+        if is_beside(&yaw, &self.yaw) || is_beside(&pitch, &self.pitch) {
+            return Vec::new();
+        }
         let corners = [
             [yaw.low, pitch.low],
             [yaw.high, pitch.low],
@@ -300,23 +312,18 @@ fn axes(svg: &mut Svg, plot: &Plot) {
     for angle in ticks(&plot.yaw, wide / 55.0) {
         let [at, _] = plot.place([angle.to_radians(), 0.0]);
         svg.line([at, y + high], [at, y + high + 5.0], "frame");
-        let name = degrees(angle);
+        let name = format!("{}°", signed(angle, 0));
         svg.text([at, y + high + 20.0], Anchor::Middle, "", &name);
     }
     for angle in ticks(&plot.pitch, high / 36.0) {
         let [_, at] = plot.place([0.0, angle.to_radians()]);
         svg.line([x - 5.0, at], [x, at], "frame");
-        let name = degrees(angle);
+        let name = format!("{}°", signed(angle, 0));
         svg.text([x - 9.0, at + 4.5], Anchor::End, "", &name);
     }
     let middle = [x + wide / 2.0, y + high / 2.0];
     svg.text([middle[0], y + high + 39.0], Anchor::Middle, "", "yaw");
     svg.turned_text([x - 50.0, middle[1]], -90.0, Anchor::Middle, "", "pitch");
-}
-
-/// Writes a whole angle in degrees, with a true minus sign.
-fn degrees(angle: f64) -> String {
-    format!("{}°", plain(angle, 0)).replace('-', "−")
 }
 
 /// Draws the bar that says which colour is which number.

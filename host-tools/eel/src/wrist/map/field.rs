@@ -231,7 +231,7 @@ mod tests {
             assert!((field.values[240][240] - home).abs() < 1e-9);
             for row in field.values.windows(2) {
                 // A quarter of a degree; at the border of reach a root.
-                assert!((row[1][240] - row[0][240]).abs() < 0.12);
+                assert!((row[1][240] - row[0][240]).abs() < 0.2);
             }
         }
         assert!(map.reach.values[0][240] < 0.0 && map.clear.values[0][240] < 0.0);

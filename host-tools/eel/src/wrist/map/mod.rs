@@ -15,7 +15,7 @@ use eel_kinematics::design::{Range, Travel};
 use serde::Serialize;
 
 use super::args::{Architecture, Workspace};
-use super::number::{Unit, plain};
+use super::number::{Unit, plain, signed};
 use super::{check_out, deliver, refused};
 use chart::Heading;
 use field::{Extreme, Extremes, Map, Summary};
@@ -72,8 +72,12 @@ pub fn run(out: &mut dyn Write, asked: &Workspace) -> Result<()> {
     let roll = unit.read(asked.roll)?;
     let yaw = range("--yaw-range", &asked.yaw_range, YAW, PI, unit)?;
     let pitch = range("--pitch-range", &asked.pitch_range, PITCH, FRAC_PI_2, unit)?;
-    let mut measures = asked.of.clone();
-    measures.dedup();
+    let mut measures = Vec::new();
+    for measure in &asked.of {
+        if !measures.contains(measure) {
+            measures.push(*measure);
+        }
+    }
     let geometry = subject.architecture.geometry();
     let map = Map::compute(&geometry, [&yaw, &pitch], roll, asked.cells, &measures);
     let (Some(map), Some(summary)) = (map, Summary::of(&geometry, roll)) else {
@@ -85,7 +89,7 @@ pub fn run(out: &mut dyn Write, asked: &Workspace) -> Result<()> {
         title: format!("Workspace of the wrist with {}", name.replace('-', " ")),
         subtitle: format!(
             "home's working mode ++, roll {}°; the box ±30° × ±15° × ±4° may grow {} times",
-            plain(roll.to_degrees(), 1),
+            signed(roll.to_degrees(), 1),
             plain(summary.largest_box, 2)
         ),
         least: [least_yaw, least_pitch],
@@ -156,12 +160,19 @@ fn summary_text(name: &str, roll: f64, summary: &Summary) -> String {
         let [yaw, pitch, roll] = pose.map(|angle| plain(angle.to_degrees(), 1));
         format!("yaw {yaw}°, pitch {pitch}°, roll {roll}°")
     };
+    let number = |value: f64| {
+        if value.is_finite() {
+            plain(value, 4)
+        } else {
+            "∞".to_owned()
+        }
+    };
     let lines = |extremes: &Extremes| {
         format!(
             "    least margin             {:>8}  at {}\n    worst condition of rates {:>8}  at {}\n",
-            plain(extremes.margin.value, 4),
+            number(extremes.margin.value),
             at(extremes.margin.pose),
-            plain(extremes.condition.value, 4),
+            number(extremes.condition.value),
             at(extremes.condition.pose)
         )
     };

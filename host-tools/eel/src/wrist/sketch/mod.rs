@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::args::{Architecture, Draw, Figure};
 use super::direct::phi_psi;
-use super::number::{Unit, plain};
+use super::number::{Unit, signed};
 use super::place::Place;
 use super::{check_out, deliver, refused};
 use panel::Panel;
@@ -335,9 +335,4 @@ fn angles(radians: &[f64], unit: Unit) -> String {
 /// Returns an angle in its unit: a millionth of a radian, a ten thousandth of a degree.
 fn short(angle: f64, unit: Unit) -> String {
     signed(angle, if unit.name == "deg" { 4 } else { 6 })
-}
-
-/// Returns a number with a true minus sign.
-fn signed(number: f64, places: usize) -> String {
-    plain(number, places).replace('-', "−")
 }

@@ -114,10 +114,9 @@ fn extent(panels: &[Panel], scale: f64) -> Rectangle {
             Flat::Area(corners, ..) => corners,
         };
         for point in points {
-            for k in 0..2 {
-                extent.0[k] = extent.0[k].min(point[k]);
-                extent.1[k] = extent.1[k].max(point[k]);
-            }
+            let [x, y] = *point;
+            extent.0 = [extent.0[0].min(x), extent.0[1].min(y)];
+            extent.1 = [extent.1[0].max(x), extent.1[1].max(y)];
         }
     }
     extent
