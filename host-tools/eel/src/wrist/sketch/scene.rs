@@ -81,6 +81,10 @@ impl Scene {
         scene.base();
         scene.serial_leg(rotation, theta[2]);
         scene.platform(&points);
+        // With orthogonal axes both cranks turn about O.
+        let is_apart = points.a.iter().any(|a| a.norm() > 1e-6);
+        let name = if is_apart { "O" } else { "O = A₁ = A₂" };
+        scene.name(Vector3::zeros(), name, "name");
         for (k, leg) in geometry.legs.iter().enumerate() {
             scene.leg(k, leg, &points);
         }
@@ -129,7 +133,6 @@ impl Scene {
             self.name(axis * to, name, "name3");
         }
         self.add("joint", Outline::Ball(Vector3::zeros()));
-        self.name(Vector3::zeros(), "O", "name");
         self.name(at((low + high) / 2.0), "motor 3", "name3");
     }
 
