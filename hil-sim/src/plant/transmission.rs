@@ -9,6 +9,10 @@ use super::algebra::{Mat3, Vec3, pose_of, pose_rate_matrix};
 
 /// How three motors move a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "one for the whole plant, among its settings"
+)]
 pub enum Transmission {
     /// The spherical parallel wrist, with the geometry of the unit.
     Wrist(Geometry),

@@ -47,7 +47,7 @@ pub enum Command {
     Stats(Stats),
     /// Write the dictionary as EDS, DBC or markdown
     Export(Export),
-    /// Ask the wrist: inverse, direct, Jacobian, torques, margins, and the paper's claims
+    /// Ask the wrist: inverse, direct, Jacobian, torques, margins, maps, drawings, the paper's claims
     Wrist(Wrist),
 }
 

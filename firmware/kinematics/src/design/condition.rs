@@ -1,9 +1,12 @@
-//! How evenly a configuration turns rates into rates: condition numbers from singular values.
+//! How evenly a configuration turns rates into rates: condition numbers, conditioning indices and
+//! manipulability, from singular values.
+//!
+//! Lengths are in arms, so that none depends on the scale.
 
 use libm::{fabs, sqrt};
 use nalgebra::{Matrix3, Vector3};
 
-use super::Jacobians;
+use super::{Geometry, Jacobians, Range, rotation};
 
 /// Sweeps of the rotations; they converge quadratically, a 3×3 matrix within six.
 const SWEEPS: usize = 16;
@@ -77,6 +80,69 @@ impl Jacobians {
             condition(&map)
         } else {
             f64::INFINITY
+        }
+    }
+
+    /// Returns the inverse condition number of A, the local conditioning index: 1 where isotropic,
+    /// 0 at an assembly singularity.
+    pub fn isotropy(&self) -> f64 {
+        1.0 / self.condition()
+    }
+
+    /// Returns the inverse condition number of B⁻¹ A: 1 where isotropic, 0 at a serial or an
+    /// assembly singularity. The velocity map A⁻¹ B has the same.
+    pub fn isotropy_of_rates(&self) -> f64 {
+        1.0 / self.condition_of_rates()
+    }
+
+    /// Returns Yoshikawa's manipulability √det(A Aᵀ) of A, which is |det A|.
+    pub fn manipulability(&self) -> f64 {
+        fabs(self.det_a())
+    }
+
+    /// Returns Yoshikawa's manipulability √det(J Jᵀ) of the velocity map J = A⁻¹ B: 0 at a serial
+    /// singularity, infinite at an assembly singularity, not a number where both meet.
+    pub fn manipulability_of_rates(&self) -> f64 {
+        fabs(self.b[0] * self.b[1] * self.b[2]) / self.manipulability()
+    }
+}
+
+/// Conditioning over a box of poses, as means over a grid; what is out of reach counts as 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GlobalIsotropy {
+    /// The global conditioning index of A: the mean of 1/κ(A).
+    pub of_a: f64,
+    /// The global conditioning index of the motors' rates: the mean of 1/κ(B⁻¹ A).
+    pub of_rates: f64,
+    /// The share of the box that is in reach.
+    pub in_reach: f64,
+}
+
+impl Geometry {
+    /// Returns the global conditioning indices over yaw, pitch and roll, in home's working mode, by
+    /// the midpoints of `cells`³ cells; at least one.
+    pub fn global_isotropy(&self, over: &[Range; 3], cells: u32) -> GlobalIsotropy {
+        let cells = cells.max(1);
+        let share = |k: u32| (f64::from(k) + 0.5) / f64::from(cells);
+        let (mut of_a, mut of_rates, mut reached) = (0.0, 0.0, 0.0);
+        for i in 0..cells {
+            for (j, k) in (0..cells).flat_map(|j| (0..cells).map(move |k| (j, k))) {
+                let [yaw, pitch, roll] = over;
+                let at = rotation(yaw.at(share(i)), pitch.at(share(j)), roll.at(share(k)));
+                if let Some(theta) = self.inverse(&at) {
+                    let jacobians = self.jacobians(&at, &theta);
+                    of_a += jacobians.isotropy();
+                    of_rates += jacobians.isotropy_of_rates();
+                    reached += 1.0;
+                }
+            }
+        }
+        let edge = f64::from(cells);
+        let count = edge * edge * edge;
+        GlobalIsotropy {
+            of_a: of_a / count,
+            of_rates: of_rates / count,
+            in_reach: reached / count,
         }
     }
 }

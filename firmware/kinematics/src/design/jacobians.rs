@@ -3,11 +3,15 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// A and the diagonal of B at one configuration: A ω = B θ̇, rows (p×r)ᵀ, (p×r)ᵀ, z''ᵀ.
+///
+/// Rows 1 and 2 of A and of B are products of two lengths, row 3 is a number. Here lengths are in
+/// units of the platform's arm, so that nothing depends on the scale; [`Jacobians::scaled`] gives the
+/// paper's rows. The maps B⁻¹A, A⁻¹B and B A⁻ᵀ are the same for both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jacobians {
-    /// A, in units of the platform's arm times the rod.
+    /// A, lengths in arms.
     pub a: Matrix3<f64>,
-    /// The diagonal of B: (l×r)·i of both legs, and cos φ.
+    /// The diagonal of B: (l×r)·i of both legs with lengths in arms, and cos φ.
     pub b: Vector3<f64>,
 }
 
@@ -42,5 +46,31 @@ impl Jacobians {
     /// Returns det A: 1 at home, 0 at an assembly singularity.
     pub fn det_a(&self) -> f64 {
         self.a.determinant()
+    }
+
+    /// Returns A⁻¹ B, which makes an angular velocity of the motors' rates; nothing where A is
+    /// singular. It is the transpose of the torque map.
+    pub fn velocity_map(&self) -> Option<Matrix3<f64>> {
+        Some(self.torque_map()?.transpose())
+    }
+
+    /// Returns Aᵀ B⁻¹, which makes a moment of the motors' torques: the inverse of the torque map;
+    /// nothing at a serial singularity. It is the transpose of [`Jacobians::rate_map`].
+    pub fn moment_map(&self) -> Option<Matrix3<f64>> {
+        let map = self.rate_map().transpose();
+        if map.iter().all(|entry| entry.is_finite()) {
+            Some(map)
+        } else {
+            None
+        }
+    }
+
+    /// Returns A and B with lengths in the unit of an arm: rows 1 and 2 in length².
+    pub fn scaled(&self, arm: f64) -> Self {
+        let square = Vector3::new(arm * arm, arm * arm, 1.0);
+        Self {
+            a: Matrix3::from_diagonal(&square) * self.a,
+            b: self.b.component_mul(&square),
+        }
     }
 }

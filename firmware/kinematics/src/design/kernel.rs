@@ -12,13 +12,13 @@ use crate::wrist::{self, Pull, Push};
 const TOLERANCE: f64 = 0.02;
 
 impl Geometry {
-    /// Returns the kernel of a unit with parallel actuators.
+    /// Returns the kernel of a unit with parallel actuators, of whatever scale.
     ///
     /// Nothing where a crank axis isn't x, or where a crank's centre, a length or a zero differs
     /// from [`Geometry::PARALLEL_ACTUATORS`] by more than 2 % (of the arm, of itself, of a radian).
     pub fn kernel(&self) -> Option<wrist::Wrist> {
         let [ideal1, ideal2] = &Self::PARALLEL_ACTUATORS.legs;
-        let [first, second] = &self.legs;
+        let [first, second] = &self.scaled(1.0)?.legs;
         let cranks = fixed(first.crank * second.crank, 31)?;
         Some(wrist::Wrist {
             legs: [first.kernel(ideal1)?, second.kernel(ideal2)?],

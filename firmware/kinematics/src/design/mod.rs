@@ -1,18 +1,28 @@
 //! The general model of the wrist in double precision: all three architectures of the paper.
 //!
-//! For the simulator's transmission, for tests, and for the making of a kernel from a unit's
-//! measured geometry. Only `libm`'s functions, so that every machine gives the same bits.
-//! Lengths are in units of the platform's arm |OC|; angles do not depend on the scale.
+//! For design work, for the simulator's transmission, for tests, and for the making of a kernel from
+//! a unit's measured geometry. Only `libm`'s functions, so that every machine gives the same bits.
+//! [`Geometry`] holds lengths, scale and travel; all inverse and direct solutions have names
+//! ([`WorkingMode`], [`AssemblyMode`]); [`Jacobians`] holds the maps of rates and torques and how evenly
+//! they work; [`Margins`] says how far each singularity is. Angles are in radians and, like margins and
+//! condition numbers, do not depend on the scale.
 
+mod closed;
 mod condition;
 mod geometry;
 mod jacobians;
 mod kernel;
+mod margins;
+mod modes;
+mod travel;
 
-pub use condition::{condition, singular_values};
+pub use condition::{GlobalIsotropy, condition, singular_values};
 pub use geometry::{Geometry, Leg};
 pub use jacobians::Jacobians;
+pub use margins::Margins;
+pub use modes::{AssemblyMode, WorkingMode};
 pub use nalgebra::{Matrix3, Vector3};
+pub use travel::{Coordinate, Limit, Range, Travel};
 
 use libm::{asin, atan2, cos, sin};
 

@@ -1,7 +1,7 @@
 //! What the tests share: a seeded generator, conversions, the paper's workspace.
 #![allow(dead_code, reason = "each test file uses its part")]
 
-use eel_kinematics::design::{self, Matrix3, Vector3};
+use eel_kinematics::design::{self, Geometry, Matrix3, Vector3};
 use eel_kinematics::{Joints, Pose, Rotation};
 use eel_units::{Angle, AngularVelocity, Torque};
 
@@ -14,6 +14,13 @@ pub const WORKSPACE: [f64; 3] = [
     core::f64::consts::PI / 6.0,
     core::f64::consts::PI / 12.0,
     core::f64::consts::PI / 45.0,
+];
+
+/// The three mechanisms of the paper.
+pub const ARCHITECTURES: [Geometry; 3] = [
+    Geometry::PARALLEL_AXES,
+    Geometry::ORTHOGONAL_AXES,
+    Geometry::PARALLEL_ACTUATORS,
 ];
 
 /// A seeded generator (xorshift64*); print the seed.

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use anyhow::Result;
 use eel_kinematics::Direct;
-use eel_kinematics::design::{self, Geometry, Matrix3};
+use eel_kinematics::design::{self, AssemblyMode, Geometry, Matrix3};
 use serde::Serialize;
 
 use super::args::{Architecture, Fk, Kernel};
@@ -12,15 +12,13 @@ use super::fixed::{self, Choice};
 use super::number::{Unit, plain};
 use super::refused;
 
-/// Assembly modes in the order of `Geometry::direct_all`.
-const BRANCHES: [&str; 4] = ["home", "other-psi", "other-phi", "other-both"];
-
 #[derive(Serialize)]
 struct Answer {
     architecture: Architecture,
     kernel: Kernel,
     unit: &'static str,
     theta: [f64; 3],
+    assembly_mode: &'static str,
     #[serde(flatten)]
     answer: Platform,
     f64: Platform,
@@ -41,7 +39,7 @@ struct Platform {
 
 #[derive(Serialize)]
 struct Solution {
-    branch: &'static str,
+    assembly_mode: &'static str,
     #[serde(flatten)]
     platform: Platform,
 }
@@ -89,7 +87,7 @@ pub fn phi_psi(rotation: &Matrix3<f64>, theta3: f64) -> [f64; 2] {
 
 /// Answers `eel wrist fk`.
 pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
-    let unit = Unit::of(&fk.common);
+    let unit = Unit::of(&fk.common.subject);
     let Ok(asked) = <[f64; 3]>::try_from(fk.theta.clone()) else {
         return Err(refused(format!(
             "--theta takes three angles, as in --theta 0.1,0.2,0.785; {} came",
@@ -98,36 +96,42 @@ pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
     };
     let [a, b, c] = asked;
     let theta = [unit.read(a)?, unit.read(b)?, unit.read(c)?];
-    let geometry = fk.common.architecture.geometry();
+    let geometry = fk.common.subject.architecture.geometry();
     let all = platforms(&geometry, &theta);
-    let home = match all.first() {
-        Some(("home", platform)) if geometry.direct(&theta).is_some() => *platform,
-        _ => {
-            return Err(refused(
-                "no platform joins these motor angles in the home branch; bring theta nearer to home, \
-                 (0, 0, π/4) rad (angles are in radians without --degrees)",
-            ));
-        }
+    let mode = fk.assembly_mode;
+    // In home's branch cos φ must be positive too.
+    let exists = mode != AssemblyMode::HOME || geometry.direct(&theta).is_some();
+    let Some((_, asked_for)) = all.iter().find(|(name, _)| exists && *name == mode.name()) else {
+        return Err(no_platform(mode, &all));
     };
-    let choice = fixed::choose(&fk.common, || fixed::direct(&theta))?;
+    let other = (mode != AssemblyMode::HOME).then(|| mode.name());
+    let choice = fixed::choose(&fk.common, other, || fixed::direct(&theta))?;
     let of_kernel = choice
         .fixed
         .as_ref()
         .map(|found| kernel_platform(found, theta[2]));
-    if !fk.common.json {
-        return write_text(out, fk, unit, (&home, of_kernel.as_ref()), &all, &choice);
+    if !fk.common.subject.json {
+        return write_text(
+            out,
+            fk,
+            unit,
+            (asked_for, of_kernel.as_ref()),
+            &all,
+            &choice,
+        );
     }
     let fixed = of_kernel.map(|platform| platform.in_unit(unit));
-    let f64 = home.in_unit(unit);
-    let solutions = all.iter().map(|(branch, platform)| Solution {
-        branch,
+    let f64 = asked_for.in_unit(unit);
+    let solutions = all.iter().map(|(assembly_mode, platform)| Solution {
+        assembly_mode,
         platform: platform.in_unit(unit),
     });
     let answer = Answer {
-        architecture: fk.common.architecture,
+        architecture: fk.common.subject.architecture,
         kernel: choice.used,
         unit: unit.name,
         theta: asked,
+        assembly_mode: mode.name(),
         answer: fixed
             .filter(|_| choice.used == Kernel::Fixed)
             .unwrap_or(f64),
@@ -140,14 +144,34 @@ pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
     Ok(writeln!(out)?)
 }
 
-/// Returns every direct solution with its branch, home's first.
+/// Says that the motors' angles can't be joined in a mode, and in which they can.
+fn no_platform(mode: AssemblyMode, all: &[(&'static str, Platform)]) -> anyhow::Error {
+    let others: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    let others: Vec<&str> = others
+        .into_iter()
+        .filter(|name| *name != mode.name())
+        .collect();
+    let cure = if others.is_empty() {
+        String::new()
+    } else {
+        format!(", or say --assembly-mode {}", others.join(" or "))
+    };
+    refused(format!(
+        "no platform joins these motor angles in the {} branch; bring theta nearer to home, \
+         (0, 0, π/4) rad{cure} (angles are in radians without --degrees)",
+        mode.name()
+    ))
+}
+
+/// Returns every direct solution with the name of its mode, home's first.
 fn platforms(geometry: &Geometry, theta: &[f64; 3]) -> Vec<(&'static str, Platform)> {
-    let found = BRANCHES.into_iter().zip(geometry.direct_all(theta));
+    let names = AssemblyMode::ALL.map(AssemblyMode::name);
+    let found = names.into_iter().zip(geometry.direct_all(theta));
     found
-        .filter_map(|(branch, rotation)| {
+        .filter_map(|(name, rotation)| {
             let rotation = rotation?;
             let det_a = geometry.jacobians(&rotation, theta).det_a();
-            Some((branch, Platform::of(&rotation, theta[2], det_a)))
+            Some((name, Platform::of(&rotation, theta[2], det_a)))
         })
         .collect()
 }
@@ -165,14 +189,14 @@ fn write_text(
     out: &mut dyn Write,
     fk: &Fk,
     unit: Unit,
-    (home, of_kernel): (&Platform, Option<&Platform>),
+    (asked_for, of_kernel): (&Platform, Option<&Platform>),
     all: &[(&'static str, Platform)],
     choice: &Choice<Direct>,
 ) -> Result<()> {
     writeln!(
         out,
         "{}, angles in {}",
-        fk.common.architecture.name(),
+        fk.common.subject.architecture.name(),
         unit.name
     )?;
     let heads = ["phi", "psi", "yaw", "pitch", "roll", "det A"];
@@ -185,10 +209,10 @@ fn write_text(
     if let Some(platform) = of_kernel {
         line("fixed", platform)?;
     }
-    line("f64", home)?;
+    line("f64", asked_for)?;
     if fk.all {
-        for (branch, platform) in all {
-            line(branch, platform)?;
+        for (name, platform) in all {
+            line(name, platform)?;
         }
     }
     if let Some(reason) = choice.refusal {

@@ -9,7 +9,7 @@ use super::args::{Architecture, Common, Kernel};
 use super::refused;
 
 const Q24: f64 = (1u64 << 24) as f64;
-const Q27: f64 = (1u64 << 27) as f64;
+const Q26: f64 = (1u64 << 26) as f64;
 const Q29: f64 = (1u64 << 29) as f64;
 const Q30: f64 = (1u64 << 30) as f64;
 /// What an angle (rad) and a torque (N·m) hold, a little less.
@@ -26,17 +26,22 @@ pub struct Choice<T> {
     pub refusal: Option<&'static str>,
 }
 
-/// Asks the kernel, as far as the architecture is its own, and decides who answers.
+/// Asks the kernel, as far as it knows the architecture and no other mode than home's is asked for, and
+/// decides who answers.
 pub fn choose<T>(
     common: &Common,
+    other_mode: Option<&str>,
     ask: impl FnOnce() -> Result<T, &'static str>,
 ) -> Result<Choice<T>> {
-    if common.architecture != Architecture::ParallelActuators {
+    let architecture = common.subject.architecture;
+    if architecture != Architecture::ParallelActuators || other_mode.is_some() {
         if common.kernel == Some(Kernel::Fixed) {
+            let beyond = match other_mode {
+                Some(mode) => format!("home's modes only, not {mode}"),
+                None => format!("parallel-actuators only, not {}", architecture.name()),
+            };
             return Err(refused(format!(
-                "the fixed-point kernel knows parallel-actuators only, not {}; leave --kernel out or \
-                 say --kernel f64",
-                common.architecture.name()
+                "the fixed-point kernel knows {beyond}; leave --kernel out or say --kernel f64"
             )));
         }
         return Ok(Choice {
@@ -96,7 +101,7 @@ pub fn at(pose: [f64; 3]) -> Result<Direct, &'static str> {
 /// Returns the kernel's torque map B A⁻ᵀ.
 pub fn torque_map(direct: &Direct) -> Matrix3<f64> {
     let rows = direct.jacobian.torque_rows();
-    Matrix3::from_fn(|motor, axis| f64::from(rows[motor][axis]) / Q27)
+    Matrix3::from_fn(|motor, axis| f64::from(rows[motor][axis]) / Q26)
 }
 
 /// Returns an orientation as a matrix.
@@ -150,7 +155,9 @@ fn angle(radians: f64) -> Result<Angle, &'static str> {
 
 const fn reason(error: PoseError) -> &'static str {
     match error {
-        PoseError::OutOfReach => "out of reach, or beyond its range of about 1.12 rad from home",
+        PoseError::OutOfReach => {
+            "out of reach, or beyond its range (yaw ±1 rad, pitch and roll ±0.5 rad, cranks ±0.97 rad)"
+        }
         PoseError::Singular => "too near a singularity",
     }
 }

@@ -3,15 +3,13 @@
 use std::io::Write;
 
 use anyhow::Result;
+use eel_kinematics::design::{AssemblyMode, WorkingMode};
 use serde::Serialize;
 
 use super::args::{Architecture, Ik, Kernel};
 use super::fixed::{self, Choice};
 use super::number::{Unit, plain};
-use super::place::Place;
-
-/// Working modes in the order of the solutions: the signs of (l×r)·i on legs 1 and 2.
-const MODES: [&str; 4] = ["++", "+-", "-+", "--"];
+use super::place::{Place, Room, travel_line};
 
 #[derive(Serialize)]
 struct Answer {
@@ -19,6 +17,8 @@ struct Answer {
     kernel: Kernel,
     unit: &'static str,
     pose: Pose,
+    working_mode: &'static str,
+    assembly_mode: Option<&'static str>,
     theta: [f64; 3],
     theta_f64: [f64; 3],
     theta_fixed: Option<[f64; 3]>,
@@ -27,7 +27,12 @@ struct Answer {
     b: [f64; 3],
     condition: f64,
     condition_of_rates: f64,
+    isotropy: f64,
+    isotropy_of_rates: f64,
+    manipulability: f64,
+    manipulability_of_rates: f64,
     margin: f64,
+    travel: Room,
     #[serde(skip_serializing_if = "Option::is_none")]
     solutions: Option<[[f64; 3]; 4]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,10 +49,12 @@ struct Pose {
 /// Answers `eel wrist ik`.
 pub fn run(out: &mut dyn Write, ik: &Ik) -> Result<()> {
     let common = &ik.at.common;
-    let unit = Unit::of(common);
-    let place = Place::find(&ik.at, unit)?;
-    let choice = fixed::choose(common, || fixed::inverse(place.pose))?;
-    if !common.json {
+    let unit = Unit::of(&common.subject);
+    let mode = ik.working_mode;
+    let place = Place::find_in(mode, &common.subject, &ik.at.pose, unit)?;
+    let other = (mode != WorkingMode::HOME).then(|| mode.name());
+    let choice = fixed::choose(common, other, || fixed::inverse(place.pose))?;
+    if !common.subject.json {
         return write_text(out, ik, unit, &place, &choice);
     }
     let answered = choice
@@ -58,10 +65,12 @@ pub fn run(out: &mut dyn Write, ik: &Ik) -> Result<()> {
     let theta_f64 = unit.show(place.theta);
     let [yaw, pitch, roll] = unit.show(place.pose);
     let answer = Answer {
-        architecture: common.architecture,
+        architecture: common.subject.architecture,
         kernel: choice.used,
         unit: unit.name,
         pose: Pose { yaw, pitch, roll },
+        working_mode: mode.name(),
+        assembly_mode: place.assembly_mode.map(AssemblyMode::name),
         theta: answered.map_or(theta_f64, |found| unit.show(found.theta)),
         theta_f64,
         theta_fixed,
@@ -70,11 +79,16 @@ pub fn run(out: &mut dyn Write, ik: &Ik) -> Result<()> {
         b: place.jacobians.b.into(),
         condition: place.jacobians.condition(),
         condition_of_rates: place.jacobians.condition_of_rates(),
-        margin: answered.map_or(place.margin(), |found| found.margin),
+        isotropy: place.jacobians.isotropy(),
+        isotropy_of_rates: place.jacobians.isotropy_of_rates(),
+        manipulability: place.jacobians.manipulability(),
+        manipulability_of_rates: place.jacobians.manipulability_of_rates(),
+        margin: answered.map_or(place.margins.legs(), |found| found.margin),
+        travel: Room::of(&place.limit, unit),
         solutions: ik
             .all
             .then(|| place.solutions.map(|theta| unit.show(theta))),
-        working_modes: ik.all.then_some(MODES),
+        working_modes: ik.all.then(|| WorkingMode::ALL.map(WorkingMode::name)),
     };
     serde_json::to_writer(&mut *out, &answer)?;
     Ok(writeln!(out)?)
@@ -87,7 +101,7 @@ fn write_text(
     place: &Place,
     choice: &Choice<fixed::Inverse>,
 ) -> Result<()> {
-    let name = ik.at.common.architecture.name();
+    let name = ik.at.common.subject.architecture.name();
     writeln!(out, "{name}, angles in {}", unit.name)?;
     writeln!(out, "           {:>14}{:>14}{:>14}", "yaw", "pitch", "roll")?;
     writeln!(out, "  pose     {}", unit.columns(&place.pose))?;
@@ -104,9 +118,13 @@ fn write_text(
     }
     writeln!(out, "  f64      {}", unit.columns(&place.theta))?;
     if ik.all {
-        for (mode, theta) in MODES.iter().zip(&place.solutions) {
-            let home = if *mode == "++" { "  home" } else { "" };
-            writeln!(out, "  mode {mode}  {}{home}", unit.columns(theta))?;
+        for (mode, theta) in WorkingMode::ALL.into_iter().zip(&place.solutions) {
+            let home = if mode == WorkingMode::HOME {
+                "  home"
+            } else {
+                ""
+            };
+            writeln!(out, "  mode {}  {}{home}", mode.name(), unit.columns(theta))?;
         }
     }
     let jacobians = &place.jacobians;
@@ -118,10 +136,17 @@ fn write_text(
         b.join(", "),
         plain(jacobians.condition(), 4),
         plain(jacobians.condition_of_rates(), 4),
-        plain(place.margin(), 6),
+        plain(place.margins.legs(), 6),
     )?;
-    if jacobians.det_a() <= 0.0 {
-        writeln!(out, "  not in home's assembly mode: det A is not positive")?;
+    if ik.working_mode != WorkingMode::HOME || place.assembly_mode != Some(AssemblyMode::HOME) {
+        let assembly = place
+            .assembly_mode
+            .map_or("none: det A = 0", AssemblyMode::name);
+        let working = ik.working_mode.name();
+        writeln!(out, "  working mode {working}, assembly mode {assembly}")?;
+    }
+    if place.limit.is_passed() {
+        writeln!(out, "  {}", travel_line(&place.limit, unit))?;
     }
     Ok(())
 }

@@ -7,16 +7,19 @@ mod args;
 mod direct;
 mod fixed;
 mod inverse;
+mod map;
 mod number;
 mod paper;
 mod place;
 mod share;
+mod sketch;
 mod statics;
+mod svg;
 
 use std::fmt;
 use std::io::{BufWriter, Write, stdout};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use args::Command;
 pub use args::Wrist;
@@ -47,8 +50,36 @@ pub fn run(wrist: &Wrist) -> Result<u64> {
         Command::Jacobian(at) => statics::jacobian(&mut out, at).map(|()| 0),
         Command::Torque(torque) => share::run(&mut out, torque).map(|()| 0),
         Command::Margin(at) => statics::margin(&mut out, at).map(|()| 0),
+        Command::Workspace(asked) => map::run(&mut out, asked).map(|()| 0),
+        Command::Draw(asked) => sketch::run(&mut out, asked).map(|()| 0),
         Command::Paper(paper) => paper::run(&mut out, paper.json),
     }?;
     out.flush()?;
     Ok(problems)
+}
+
+/// Writes a drawing to a file, or to the terminal for `-`, and says where it is if that is not the
+/// terminal.
+fn deliver(out: &mut dyn Write, target: &str, drawing: &str) -> Result<Option<String>> {
+    if target == "-" {
+        out.write_all(drawing.as_bytes())?;
+        return Ok(None);
+    }
+    std::fs::write(target, drawing).with_context(|| {
+        format!("can't write {target}; --out takes a file in a folder that exists, or - for the terminal")
+    })?;
+    Ok(Some(format!(
+        "wrote {target} ({} KB)",
+        drawing.len().div_ceil(1024)
+    )))
+}
+
+/// Refuses JSON and a drawing on the same terminal.
+fn check_out(json: bool, target: Option<&str>) -> Result<()> {
+    if json && target == Some("-") {
+        return Err(refused(
+            "--json and --out - would both go to the terminal; leave one out, or name a file with --out",
+        ));
+    }
+    Ok(())
 }

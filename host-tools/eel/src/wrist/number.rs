@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::args::Common;
+use super::args::Subject;
 use super::refused;
 
 /// The unit of angles at the command line.
@@ -16,8 +16,8 @@ pub struct Unit {
 
 impl Unit {
     /// Returns the unit that is asked for.
-    pub fn of(common: &Common) -> Self {
-        if common.degrees {
+    pub fn of(subject: &Subject) -> Self {
+        if subject.degrees {
             Self {
                 name: "deg",
                 per_radian: 1f64.to_degrees(),
@@ -74,14 +74,9 @@ pub fn plain(number: f64, places: usize) -> String {
     }
 }
 
-/// Returns an angle in radians within ±π.
-pub fn wrapped(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
-    if angle.abs() <= PI {
-        angle
-    } else {
-        (angle + PI).rem_euclid(TAU) - PI
-    }
+/// Returns a number as drawings have it: with a true minus sign.
+pub fn signed(number: f64, places: usize) -> String {
+    plain(number, places).replace('-', "−")
 }
 
 #[cfg(test)]
@@ -92,12 +87,6 @@ mod tests {
     fn a_number_that_rounds_to_zero_has_no_sign() {
         assert_eq!(plain(-1e-12, 3), "0.000");
         assert_eq!(plain(-0.0015, 3), "-0.002");
-    }
-
-    #[test]
-    fn angles_come_back_within_half_a_turn() {
-        assert_eq!(wrapped(1.0), 1.0);
-        assert!((wrapped(7.0) - (7.0 - std::f64::consts::TAU)).abs() < 1e-15);
-        assert!((wrapped(-4.0) - (std::f64::consts::TAU - 4.0)).abs() < 1e-15);
+        assert_eq!(signed(-0.0015, 3), "−0.002");
     }
 }

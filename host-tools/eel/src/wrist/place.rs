@@ -3,35 +3,58 @@
 use std::f64::consts::FRAC_PI_4;
 
 use anyhow::Result;
-use eel_kinematics::design::{self, Geometry, Jacobians, Matrix3};
+use eel_kinematics::Side;
+use eel_kinematics::design::{
+    self, AssemblyMode, Geometry, Jacobians, Limit, Margins, Matrix3, WorkingMode,
+};
+use serde::Serialize;
 
-use super::args::At;
-use super::number::{Unit, wrapped};
+use super::args::{At, PoseArguments, Subject};
+use super::number::{Unit, plain};
 use super::refused;
 
 /// Below this cos φ the third motor's angle is no longer determined.
 const LEAST_COS_PHI: f64 = 1e-9;
 
-/// A pose that can be reached, and the general model's answer in the home working mode.
+/// A pose that can be reached, and the general model's answer in a working mode.
 pub struct Place {
     /// Yaw, pitch and roll in rad.
     pub pose: [f64; 3],
+    /// The same as a matrix.
+    pub rotation: Matrix3<f64>,
     /// The motors' angles in rad.
     pub theta: [f64; 3],
-    /// All four solutions in rad, home's first.
+    /// All four solutions in rad, in the order of `WorkingMode::ALL`.
     pub solutions: [[f64; 3]; 4],
     /// A and B.
     pub jacobians: Jacobians,
-    /// Margins of legs 1, 2, 3 (by B) over home's.
-    pub serial: [f64; 3],
+    /// How far each singularity is.
+    pub margins: Margins,
+    /// The assembly mode; nothing where det A vanishes.
+    pub assembly_mode: Option<AssemblyMode>,
+    /// The limit of travel with the least room.
+    pub limit: Limit,
 }
 
 impl Place {
-    /// Finds the pose that the arguments name.
+    /// Finds the pose that the arguments name, in home's working mode.
     pub fn find(at: &At, unit: Unit) -> Result<Self> {
-        let (pose, rotation) = orientation(at, unit)?;
-        let geometry = at.common.architecture.geometry();
-        let Some(solutions) = geometry.inverse_all(&rotation) else {
+        Self::find_in(WorkingMode::HOME, &at.common.subject, &at.pose, unit)
+    }
+
+    /// Finds the pose that the arguments name, in a working mode.
+    pub fn find_in(
+        mode: WorkingMode,
+        subject: &Subject,
+        asked: &PoseArguments,
+        unit: Unit,
+    ) -> Result<Self> {
+        let (pose, rotation) = orientation(asked, unit)?;
+        let geometry = subject.architecture.geometry();
+        let (Some(solutions), Some(theta)) = (
+            geometry.inverse_all(&rotation),
+            geometry.inverse_in(mode, &rotation),
+        ) else {
             return Err(out_of_reach(&geometry, pose, &rotation));
         };
         if rotation[(0, 0)].hypot(rotation[(1, 0)]) < LEAST_COS_PHI {
@@ -39,23 +62,56 @@ impl Place {
                 "at phi = ±π/2 every angle of motor 3 gives this pose; turn the pose a little towards home",
             ));
         }
-        let solutions = solutions.map(|theta| theta.map(wrapped));
-        let theta = solutions[0];
-        let jacobians = geometry.jacobians(&rotation, &theta);
-        let home = at_home(&geometry);
-        let serial = [0, 1, 2].map(|leg| jacobians.b[leg] / home.b[leg]);
+        let Some(margins) = geometry.margins(&rotation, &theta) else {
+            return Err(refused("this geometry does not reach its home"));
+        };
         Ok(Self {
             pose,
+            rotation,
             theta,
             solutions,
-            jacobians,
-            serial,
+            jacobians: geometry.jacobians(&rotation, &theta),
+            margins,
+            assembly_mode: geometry.assembly_mode(&rotation, &theta),
+            limit: geometry.travel.nearest(&rotation, &theta),
         })
     }
+}
 
-    /// Returns the serial margin as the kernel defines it: the lesser of legs 1 and 2.
-    pub fn margin(&self) -> f64 {
-        self.serial[0].min(self.serial[1])
+/// The limit of travel with the least room, as JSON.
+#[derive(Serialize)]
+pub struct Room {
+    within: bool,
+    coordinate: &'static str,
+    side: &'static str,
+    room: f64,
+}
+
+impl Room {
+    /// Returns the limit in the unit of the answer.
+    pub fn of(limit: &Limit, unit: Unit) -> Self {
+        let [room] = unit.show([limit.room]);
+        Self {
+            within: !limit.is_passed(),
+            coordinate: limit.coordinate.name(),
+            side: match limit.side {
+                Side::Low => "low",
+                Side::High => "high",
+            },
+            room,
+        }
+    }
+}
+
+/// Says how a configuration is to the limits of travel.
+pub fn travel_line(limit: &Limit, unit: Unit) -> String {
+    let room = Room::of(limit, unit);
+    let (amount, coordinate, side) = (plain(room.room.abs(), 4), room.coordinate, room.side);
+    let name = unit.name;
+    if room.within {
+        format!("within travel: {coordinate} has {amount} {name} left to its {side} limit")
+    } else {
+        format!("beyond travel: {coordinate} is {amount} {name} past its {side} limit")
     }
 }
 
@@ -65,8 +121,8 @@ pub fn at_home(geometry: &Geometry) -> Jacobians {
     geometry.jacobians(&rotation, &[0.0, 0.0, FRAC_PI_4])
 }
 
-fn orientation(at: &At, unit: Unit) -> Result<([f64; 3], Matrix3<f64>)> {
-    let asked = &at.pose;
+/// Returns yaw, pitch and roll in rad, and the orientation, that the arguments name.
+fn orientation(asked: &PoseArguments, unit: Unit) -> Result<([f64; 3], Matrix3<f64>)> {
     let radians = |angle: Option<f64>, home: f64| angle.map_or(Ok(home), |a| unit.read(a));
     if asked.theta3.or(asked.phi).or(asked.psi).is_none() {
         let pose = [
@@ -93,12 +149,10 @@ fn orientation(at: &At, unit: Unit) -> Result<([f64; 3], Matrix3<f64>)> {
 
 /// Says which leg is too short, and how much of the pose is in reach.
 fn out_of_reach(geometry: &Geometry, pose: [f64; 3], rotation: &Matrix3<f64>) -> anyhow::Error {
-    let short: Vec<String> = geometry
-        .legs
-        .iter()
-        .enumerate()
-        .filter(|(k, leg)| leg.inverse(&rotation.column(*k).into_owned()).is_none())
-        .map(|(k, _)| (k + 1).to_string())
+    let reach = geometry.reach(rotation);
+    let short: Vec<String> = (0..2)
+        .filter(|leg| reach[*leg] < 0.0)
+        .map(|leg| (leg + 1).to_string())
         .collect();
     // The largest share of the pose that is in reach on the straight way from home.
     let is_reached = |share: f64| {

@@ -4,11 +4,11 @@ use std::io::Write;
 
 use anyhow::Result;
 use eel_kinematics::design::Matrix3;
-use eel_kinematics::{Bounds, Direct, Side};
+use eel_kinematics::{self as kinematics, Bounds, Direct, Side};
 use eel_units::Torque;
 use serde::Serialize;
 
-use super::args::{self, Architecture, Kernel};
+use super::args::{self, Architecture, Kernel, Policy};
 use super::fixed;
 use super::number::{Unit, columns};
 use super::place::Place;
@@ -33,6 +33,7 @@ struct Shared {
 struct Answer {
     architecture: Architecture,
     kernel: Kernel,
+    policy: Policy,
     tau: [f64; 3],
     achieved: [f64; 3],
     unallocated: [f64; 3],
@@ -52,24 +53,25 @@ pub fn run(out: &mut dyn Write, asked: &args::Torque) -> Result<()> {
         )));
     };
     let limits = limits(&asked.limits)?;
-    let place = Place::find(&asked.at, Unit::of(common))?;
+    let place = Place::find(&asked.at, Unit::of(&common.subject))?;
     let Some(map) = place.jacobians.torque_map() else {
         return Err(refused(
             "A is singular at this pose, no torques make a moment; move the pose a little",
         ));
     };
-    let exact = share(&map, moment, limits);
-    let choice = fixed::choose(common, || {
-        share_fixed(&fixed::at(place.pose)?, moment, limits)
+    let exact = share(&map, moment, limits, asked.policy);
+    let choice = fixed::choose(common, None, || {
+        share_fixed(&fixed::at(place.pose)?, moment, limits, asked.policy)
     })?;
     let shared = match (&choice.fixed, choice.used) {
         (Some(shared), Kernel::Fixed) => shared,
         _ => &exact,
     };
-    if common.json {
+    if common.subject.json {
         let answer = Answer {
-            architecture: common.architecture,
+            architecture: common.subject.architecture,
             kernel: choice.used,
+            policy: asked.policy,
             tau: shared.tau,
             achieved: shared.achieved,
             unallocated: shared.unallocated,
@@ -81,7 +83,7 @@ pub fn run(out: &mut dyn Write, asked: &args::Torque) -> Result<()> {
         serde_json::to_writer(&mut *out, &answer)?;
         return Ok(writeln!(out)?);
     }
-    writeln!(out, "{}, N·m", common.architecture.name())?;
+    writeln!(out, "{}, N·m", common.subject.architecture.name())?;
     writeln!(
         out,
         "               {:>14}{:>14}{:>14}",
@@ -129,14 +131,27 @@ fn limits(numbers: &[f64]) -> Result<Option<[Pair; 3]>> {
     Ok(Some(pairs))
 }
 
-/// Shares a moment in double precision: yaw first, then pitch, then roll, as the kernel does.
-fn share(map: &Matrix3<f64>, moment: [f64; 3], limits: Option<[Pair; 3]>) -> Shared {
+/// Shares a moment in double precision, as the kernel does.
+fn share(
+    map: &Matrix3<f64>,
+    moment: [f64; 3],
+    limits: Option<[Pair; 3]>,
+    policy: Policy,
+) -> Shared {
     let limits = limits.unwrap_or([[f64::NEG_INFINITY, f64::INFINITY]; 3]);
     let mut tau = [0.0f64; 3];
     let mut achieved = [0.0; 3];
     let mut bound = [None; 3];
-    for axis in 0..3 {
-        let wanted = [0, 1, 2].map(|motor| map[(motor, axis)] * moment[axis]);
+    // What is granted together: one component after the other, or all at once.
+    let groups: &[&[usize]] = match policy {
+        Policy::YawFirst => &[&[0], &[1], &[2]],
+        Policy::KeepDirection => &[&[0, 1, 2]],
+    };
+    for group in groups {
+        let wanted = [0, 1, 2].map(|motor| {
+            let parts = group.iter().map(|&axis| map[(motor, axis)] * moment[axis]);
+            parts.sum::<f64>()
+        });
         let mut fraction = 1.0;
         let mut least = None;
         for motor in 0..3 {
@@ -159,7 +174,9 @@ fn share(map: &Matrix3<f64>, moment: [f64; 3], limits: Option<[Pair; 3]>) -> Sha
             let [low, high] = limits[motor];
             tau[motor] = (tau[motor] + wanted[motor] * fraction).max(low).min(high);
         }
-        achieved[axis] = moment[axis] * fraction;
+        for &axis in *group {
+            achieved[axis] = moment[axis] * fraction;
+        }
     }
     Shared {
         tau,
@@ -174,6 +191,7 @@ fn share_fixed(
     found: &Direct,
     moment: [f64; 3],
     limits: Option<[Pair; 3]>,
+    policy: Policy,
 ) -> Result<Shared, &'static str> {
     let [x, y, z] = moment;
     let moment = [fixed::torque(x)?, fixed::torque(y)?, fixed::torque(z)?];
@@ -187,7 +205,11 @@ fn share_fixed(
             high: fixed::bound(high)?,
         };
     }
-    let shared = found.jacobian.share(moment, &bounds);
+    let policy = match policy {
+        Policy::YawFirst => kinematics::Policy::YawFirst,
+        Policy::KeepDirection => kinematics::Policy::KeepDirection,
+    };
+    let shared = found.jacobian.share(&moment, &bounds, policy);
     Ok(Shared {
         tau: shared.torque.map(fixed::newton_metres),
         achieved: shared.achieved.map(fixed::newton_metres),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::args::{Architecture, At, Kernel};
 use super::fixed;
 use super::number::{Unit, columns, plain};
-use super::place::Place;
+use super::place::{Place, Room, travel_line};
 use super::refused;
 
 type Rows = [[f64; 3]; 3];
@@ -37,7 +37,10 @@ struct MarginAnswer {
     margin: f64,
     serial: [f64; 3],
     assembly: f64,
+    depths: [f64; 2],
+    least_singular: f64,
     least: f64,
+    travel: Room,
     fixed_refusal: Option<&'static str>,
 }
 
@@ -48,9 +51,9 @@ fn rows(matrix: &Matrix3<f64>) -> Rows {
 
 /// Answers `eel wrist jacobian`.
 pub fn jacobian(out: &mut dyn Write, at: &At) -> Result<()> {
-    let unit = Unit::of(&at.common);
+    let unit = Unit::of(&at.common.subject);
     let place = Place::find(at, unit)?;
-    let choice = fixed::choose(&at.common, || fixed::at(place.pose))?;
+    let choice = fixed::choose(&at.common, None, || fixed::at(place.pose))?;
     let jacobians = &place.jacobians;
     let Some(torque_map) = jacobians.torque_map() else {
         return Err(refused(
@@ -58,7 +61,7 @@ pub fn jacobian(out: &mut dyn Write, at: &At) -> Result<()> {
         ));
     };
     let answer = JacobianAnswer {
-        architecture: at.common.architecture,
+        architecture: at.common.subject.architecture,
         unit: unit.name,
         theta: unit.show(place.theta),
         a: rows(&jacobians.a),
@@ -74,11 +77,11 @@ pub fn jacobian(out: &mut dyn Write, at: &At) -> Result<()> {
         condition: jacobians.condition(),
         condition_of_rates: jacobians.condition_of_rates(),
     };
-    if at.common.json {
+    if at.common.subject.json {
         serde_json::to_writer(&mut *out, &answer)?;
         return Ok(writeln!(out)?);
     }
-    let name = at.common.architecture.name();
+    let name = at.common.subject.architecture.name();
     writeln!(
         out,
         "{name}, theta{} {}",
@@ -114,42 +117,48 @@ pub fn jacobian(out: &mut dyn Write, at: &At) -> Result<()> {
 
 /// Answers `eel wrist margin`.
 pub fn margin(out: &mut dyn Write, at: &At) -> Result<()> {
-    let place = Place::find(at, Unit::of(&at.common))?;
-    let choice = fixed::choose(&at.common, || fixed::inverse(place.pose))?;
+    let unit = Unit::of(&at.common.subject);
+    let place = Place::find(at, unit)?;
+    let margins = &place.margins;
+    let choice = fixed::choose(&at.common, None, || fixed::inverse(place.pose))?;
     let of_kernel = choice.fixed.as_ref().map(|found| found.margin);
-    let assembly = place.jacobians.det_a();
-    let least = place.serial.into_iter().fold(assembly, f64::min);
     let answer = MarginAnswer {
-        architecture: at.common.architecture,
+        architecture: at.common.subject.architecture,
         kernel: choice.used,
         margin: of_kernel
             .filter(|_| choice.used == Kernel::Fixed)
-            .unwrap_or(place.margin()),
-        serial: place.serial,
-        assembly,
-        least,
+            .unwrap_or(margins.legs()),
+        serial: margins.serial,
+        assembly: margins.parallel,
+        depths: margins.depths,
+        least_singular: margins.least_singular,
+        least: margins.least(),
+        travel: Room::of(&place.limit, unit),
         fixed_refusal: choice.refusal,
     };
-    if at.common.json {
+    if at.common.subject.json {
         serde_json::to_writer(&mut *out, &answer)?;
         return Ok(writeln!(out)?);
     }
     writeln!(
         out,
         "{}, 1 at home, 0 at a singularity",
-        at.common.architecture.name()
+        at.common.subject.architecture.name()
     )?;
     let mut line = |name: &str, margin: f64| writeln!(out, "  {name:<28}{:>12}", plain(margin, 9));
-    line("serial, leg 1", place.serial[0])?;
-    line("serial, leg 2", place.serial[1])?;
-    line("serial, leg 3 (cos phi)", place.serial[2])?;
-    line("assembly (det A)", assembly)?;
-    line("least", least)?;
+    line("serial, leg 1", margins.serial[0])?;
+    line("serial, leg 2", margins.serial[1])?;
+    line("serial, leg 3 (cos phi)", margins.serial[2])?;
+    line("assembly (det A)", margins.parallel)?;
+    line("  its factor of leg 1", margins.depths[0])?;
+    line("  its factor of leg 2", margins.depths[1])?;
+    line("least singular value of A", margins.least_singular)?;
+    line("least", margins.least())?;
     if let Some(margin) = of_kernel {
         line("the kernel's (legs 1 and 2)", margin)?;
     }
     if let Some(reason) = choice.refusal {
         writeln!(out, "  the kernel does not answer: {reason}")?;
     }
-    Ok(())
+    Ok(writeln!(out, "  {}", travel_line(&place.limit, unit))?)
 }

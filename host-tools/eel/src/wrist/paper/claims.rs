@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4, PI, SQRT_2};
 
-use eel_kinematics::design::{self, Vector3};
+use eel_kinematics::design::{self, Travel, Vector3};
 
 use super::super::args::Architecture;
 use super::super::direct::phi_psi;
@@ -16,9 +16,6 @@ pub const ARCHITECTURES: [Architecture; 3] = [
     Architecture::OrthogonalAxes,
     Architecture::ParallelActuators,
 ];
-
-/// The paper's workspace in rad: yaw ±30°, pitch ±15°, roll ±4°.
-const WORKSPACE: [f64; 3] = [PI / 6.0, PI / 12.0, PI / 45.0];
 
 /// Steps of the workspace's grid on each side of home; its corners are on it.
 const STEPS: i32 = 8;
@@ -43,7 +40,7 @@ pub fn grid() -> impl Iterator<Item = design::Matrix3<f64>> {
         let side = side.clone();
         side.clone().flat_map(move |j| {
             side.clone().map(move |k| {
-                let [yaw, pitch, roll] = WORKSPACE;
+                let [yaw, pitch, roll] = Travel::PAPER.map(|range| range.high);
                 design::rotation(yaw * share(i), pitch * share(j), roll * share(k))
             })
         })
