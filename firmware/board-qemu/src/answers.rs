@@ -68,7 +68,7 @@ pub fn hash() -> u64 {
         };
         let answered = Wrist::PAPER.inverse(&pose).and_then(|inverse| {
             hash.add_all(inverse.joints.0.map(Angle::to_q29));
-            hash.add(inverse.margin);
+            hash.add(inverse.margin());
             Wrist::PAPER.direct(&inverse.joints)
         });
         match answered {
@@ -92,12 +92,10 @@ fn add_primitives(hash: &mut Hash, x: i32, y: i32) {
 
 fn add_direct(hash: &mut Hash, direct: &Direct, bits: [i32; 3]) {
     let Direct {
-        rotation,
-        jacobian,
-        margin,
+        rotation, jacobian, ..
     } = direct;
     hash.add_all(rotation.columns().iter().flatten().copied());
-    hash.add_all([jacobian.det_a(), *margin]);
+    hash.add_all([jacobian.det_a(), direct.margin()]);
     hash.add_all(jacobian.torque_rows().iter().flatten().copied());
     let moment = bits.map(|raw| Torque::from_q24(raw >> 4));
     let bounds = [Bounds {

@@ -218,7 +218,7 @@ fn check(
         exact.to_q29().abs_diff(float)
     });
     let margin = inverse
-        .margin
+        .margin()
         .abs_diff((floating.margin * (1 << 30) as f32) as i32);
     if apart.any(|it| it > APART) || margin > 2 * APART {
         return Err(Failure::Apart);

@@ -23,8 +23,17 @@ pub struct Direct {
     pub rotation: Rotation,
     /// Rates and torques there, and the parallel margin det A.
     pub jacobian: Jacobian,
-    /// The serial margin, Q30: the lesser (l×r)·i / ρ of the two legs, as the inverse gives it.
-    pub margin: i32,
+    serial: i32,
+}
+
+impl Direct {
+    /// Returns the serial margin in Q30: the lesser (l×r)·i / ρ of the two legs, as the inverse gives it.
+    ///
+    /// The parallel margin is [`Jacobian::det_a`].
+    #[inline]
+    pub const fn margin(&self) -> i32 {
+        self.serial
+    }
 }
 
 /// One leg with its crank turned: what the platform has to meet.
@@ -132,7 +141,7 @@ impl Wrist {
                 &second,
                 multiply_high(both, self.cranks) << 2,
             ),
-            margin,
+            serial: margin,
         })
     }
 }

@@ -3,7 +3,10 @@
 //! Everything is over √2, which no angle notices: the sum and the difference of roll's sine and
 //! cosine then are those of roll + π/4 without a multiplication, and C/√2, E, F, G all fit Q30.
 
-use eel_units::{Angle, arctangents, multiply_high, ratio_q30, root_near, sin_cos_near};
+use eel_units::{
+    Angle, arctangents_of, multiply_high, multiply_high_add, quadruple_square, ratio_q30,
+    root_near, sin_cos_near,
+};
 
 use crate::pose::{Joints, Pose, PoseError};
 use crate::vector::{Vector, dot, high, times_root_two, wide};
@@ -12,20 +15,41 @@ use crate::wrist::{Pull, Wrist};
 /// The least D/2 of a leg in Q28, the high half of its Q60: a margin of ¼.
 const LEAST_SQUARE: i32 = 1 << 23;
 
+/// The least assembly margin W2 in Q28: ¾, where home has √2. The direct kinematics has the same.
+const LEAST_ASSEMBLY: i32 = 3 << 26;
+
 /// What the inverse kinematics gives for a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inverse {
     /// The motors' angles, in the home working mode.
     pub joints: Joints,
-    /// The serial margin, Q30: the lesser √D = (l×r)·i / ρ of the two legs.
+    /// The lesser √D of the two legs over √2, Q30.
+    root: i32,
+}
+
+impl Inverse {
+    /// Returns the serial margin in Q30: the lesser √D = (l×r)·i / ρ of the two legs.
     ///
     /// 1 at home, at least 0.57 in the paper's workspace, 0 where a crank and its rod line up.
-    pub margin: i32,
+    #[inline]
+    pub fn margin(&self) -> i32 {
+        times_root_two(self.root)
+    }
+}
+
+/// The platform of a pose.
+pub(crate) struct Platform {
+    /// C1 and C2 over √2 in Q30, each wrong by at most 3 parts in 10⁹.
+    pub points: [Vector; 2],
+    /// Its z axis, C1 × C2, in Q30.
+    pub normal: Vector,
 }
 
 /// What one leg gives: tan(θ/2) in Q31, and √D over √2 in Q30.
 struct Solved {
     half_tangent: i32,
+    /// (2 tan(θ/2))² in Q30.
+    square: i32,
     margin: i32,
 }
 
@@ -34,27 +58,36 @@ impl Wrist {
     ///
     /// # Errors
     /// [`PoseError::OutOfReach`] where no configuration of the home working mode reaches the pose,
-    /// or it lies beyond the range of the kernel; [`PoseError::Singular`] where the margin is below ¼.
+    /// or it lies beyond the range of the kernel; [`PoseError::Singular`] where the serial
+    /// margin is below ¼ or the assembly margin of leg 2 has shrunk to about half of home's.
     #[inline]
     pub fn inverse(&self, pose: &Pose) -> Result<Inverse, PoseError> {
         if !pose.is_near() {
             return Err(PoseError::OutOfReach);
         }
-        let [first, second] = pose.points();
-        let solved1 = self.legs[0].pull.solve(&first)?;
-        let solved2 = self.legs[1].pull.solve(&second)?;
+        let Platform {
+            points: [first, second],
+            normal,
+        } = pose.platform();
         // θ3 = π/4 + atan((y − x)/(y + x)) of C1. Within the kernel's range y + x is positive.
         let [x, y, _] = first;
         let third = small_ratio(y - x, y + x).ok_or(PoseError::OutOfReach)?;
-        let [turn1, turn2, turn3] =
-            arctangents([solved1.half_tangent, solved2.half_tangent, third]);
+        let solved1 = self.legs[0].pull.solve(&first)?;
+        let solved2 = self.legs[1].pull.solve(&second)?;
+        if self.legs[1].pull.assembly_room(&normal, &solved2) < 0 {
+            return Err(PoseError::Singular);
+        }
+        let [turn1, turn2, turn3] = arctangents_of(
+            [solved1.half_tangent, solved2.half_tangent, third],
+            [solved1.square, solved2.square, quadruple_square(third)],
+        );
         // An arctangent in Q30, read in Q29, is twice itself: 2 atan(tan(θ/2)).
         let theta1 = turn1 - self.legs[0].zero.to_q29();
         let theta2 = turn2 - self.legs[1].zero.to_q29();
         let theta3 = Angle::FRAC_PI_4.to_q29() + (turn3 >> 1);
         Ok(Inverse {
             joints: Joints([theta1, theta2, theta3].map(Angle::from_q29)),
-            margin: times_root_two(solved1.margin.min(solved2.margin)),
+            root: solved1.margin.min(solved2.margin),
         })
     }
 }
@@ -69,29 +102,33 @@ impl Pose {
         (yaw >> 1 | pitch | roll) < 1 << 29
     }
 
-    /// Returns C1 and C2 over √2 in Q30, each wrong by at most 3 parts in 10⁹.
+    /// Returns the platform of a pose that is near.
     #[inline(always)]
-    fn points(&self) -> [Vector; 2] {
+    pub(crate) fn platform(&self) -> Platform {
         let [(sy, cy), (sp, cp), (sr, cr)] = sin_cos_near([self.yaw, self.pitch, self.roll]);
         // Sine and cosine of roll + π/4, each over √2, in Q31; the others in Q31 too.
         let (sq, cq) = (cr + sr, cr - sr);
+        let zx = sp;
         let (sy, cy, sp, cp) = (sy << 1, cy << 1, sp << 1, cp << 1);
         // Their opposites to one step of 2⁻³¹, which one instruction makes.
-        let (minus_sy, minus_cy) = (!sy, !cy);
+        let (minus_sy, minus_cy, minus_cp) = (!sy, !cy, !cp);
         let spsq = multiply_high(sp, sq) << 1;
         let spcq = multiply_high(sp, cq) << 1;
-        [
-            [
-                multiply_high(cp, cq),
-                high(wide(cy, sq) + wide(sy, spcq)),
-                high(wide(sy, sq) + wide(minus_cy, spcq)),
+        Platform {
+            points: [
+                [
+                    multiply_high(cp, cq),
+                    high(wide(cy, sq) + wide(sy, spcq)),
+                    high(wide(sy, sq) + wide(minus_cy, spcq)),
+                ],
+                [
+                    multiply_high(minus_cp, sq),
+                    high(wide(cy, cq) + wide(minus_sy, spsq)),
+                    high(wide(sy, cq) + wide(cy, spsq)),
+                ],
             ],
-            [
-                multiply_high(-cp, sq),
-                high(wide(cy, cq) + wide(minus_sy, spsq)),
-                high(wide(sy, cq) + wide(cy, spsq)),
-            ],
-        ]
+            normal: [zx, multiply_high(minus_sy, cp), multiply_high(cy, cp)],
+        }
     }
 }
 
@@ -118,8 +155,22 @@ impl Pull {
         let half_tangent = small_ratio(g - e, f + margin).ok_or(PoseError::OutOfReach)?;
         Ok(Solved {
             half_tangent,
+            square: quadruple_square(half_tangent),
             margin,
         })
+    }
+
+    /// Returns (W − ¾)(1 + tan²(θ/2)) of leg 2 in Q28: below zero where the assembly margin W is too small.
+    ///
+    /// det A is ρ1 ρ2 W1 W2, and W2 = −(B/ρ)·(C1 × C2) with the crank's end B: a linear function of
+    /// the crank's sine and cosine, so that no division is needed. W1 is 0.7 and more wherever the
+    /// other limits hold: a pose beyond the parallel singularity has no answer.
+    #[inline(always)]
+    fn assembly_room(&self, normal: &Vector, solved: &Solved) -> i32 {
+        let center = -high(dot(&self.slope, normal)) - LEAST_ASSEMBLY;
+        let along = normal[1] >> 2;
+        multiply_high_add(center - along, center + along, solved.square)
+            - multiply_high(solved.half_tangent, normal[2])
     }
 }
 

@@ -62,6 +62,51 @@ fn the_inverse_answers_rightly_or_not_at_all() {
 }
 
 #[test]
+fn no_pose_with_an_answer_lies_beyond_a_singularity() {
+    let mut random = Random::new(0xA11B_1750_0000_0005);
+    let (mut answers, mut led_back, mut least, mut worst) = (0, 0, 2.0f64, 0.0f64);
+    for round in 0..400 {
+        let geometry = match round {
+            0 => Geometry::PARALLEL_ACTUATORS,
+            _ => common::within_tolerance(&mut random),
+        };
+        let wrist = geometry.kernel().expect("within tolerance");
+        for _ in 0..2_000 {
+            // The whole range of the kernel, and its ends.
+            let ends = [1 << 29, 1 << 28, 1 << 28];
+            let [yaw, pitch, roll] = ends.map(|end: i32| match random.next() % 4 {
+                0 => Angle::from_q29(if random.next().is_multiple_of(2) {
+                    end - 1
+                } else {
+                    -end
+                }),
+                _ => Angle::from_q29((f64::from(end) * random.sign()) as i32),
+            });
+            let pose = Pose { yaw, pitch, roll };
+            let Ok(found) = wrist.inverse(&pose) else {
+                continue;
+            };
+            answers += 1;
+            let rotation = exact_rotation(&pose);
+            let theta = geometry
+                .inverse(&rotation)
+                .expect("reached in fixed point only");
+            least = least.min(geometry.jacobians(&rotation, &theta).det_a());
+            if let Ok(direct) = wrist.direct(&found.joints) {
+                led_back += 1;
+                worst = worst.max(angle_between(&matrix(&direct.rotation), &rotation));
+            }
+        }
+    }
+    println!(
+        "{answers} answers, least det A {least:.3}, {led_back} led back to {:.4} µrad",
+        worst * 1e6
+    );
+    assert!(answers > 100_000 && led_back * 100 > answers * 99);
+    assert!(least > 0.2 && worst <= 0.1e-6, "{least} {worst:e}");
+}
+
+#[test]
 fn the_direct_kinematics_answers_rightly_or_not_at_all() {
     let geometry = Geometry::PARALLEL_ACTUATORS;
     let mut random = Random::new(0xA11B_1750_0000_0002);
@@ -81,7 +126,7 @@ fn the_direct_kinematics_answers_rightly_or_not_at_all() {
             .direct(&exact_joints(&joints))
             .expect("joined in fixed point only");
         worst = worst.max(angle_between(&matrix(&found.rotation), &exact));
-        assert!(found.jacobian.det_a() > 0 && found.margin > 0);
+        assert!(found.jacobian.det_a() > 0 && found.margin() > 0);
         // The working mode is home's too: the inverse leads back.
         if let Ok(back) = Wrist::PAPER.inverse(&found.rotation.to_pose()) {
             for (a, b) in back.joints.0.into_iter().zip(joints.0) {

@@ -24,4 +24,6 @@ pub use arithmetic::{
 pub use machine::{multiply_high, multiply_high_add};
 pub use quantity::{Angle, AngularVelocity, Current, Duty, Temperature, Torque, Voltage};
 pub use time::{Duration, Instant};
-pub use trigonometry::{angle_over_sine, arctangents, sin_cos_near};
+pub use trigonometry::{
+    angle_over_sine, arctangents, arctangents_of, quadruple_square, sin_cos_near,
+};

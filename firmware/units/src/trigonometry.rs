@@ -44,9 +44,19 @@ fn sin_cos_q31<const N: usize>(angles: [i32; N]) -> [(i32, i32); N] {
 /// no more than that.
 #[inline(always)]
 pub fn arctangents<const N: usize>(tangents: [i32; N]) -> [i32; N] {
+    arctangents_of(tangents, tangents.map(quadruple_square))
+}
+
+/// Returns (2t)² in Q30 of a Q31 number within ±17/32.
+#[inline(always)]
+pub fn quadruple_square(tangent: i32) -> i32 {
+    multiply_high(tangent, tangent) << 2
+}
+
+/// Returns the same as [`arctangents`], given each tangent's [`quadruple_square`].
+#[inline(always)]
+pub fn arctangents_of<const N: usize>(tangents: [i32; N], squares: [i32; N]) -> [i32; N] {
     let [p0, p1, p2, p3, p4, p5, p6] = coefficients().arctangent;
-    // (2t)² in Q30.
-    let squares = tangents.map(|tangent| multiply_high(tangent, tangent) << 2);
     let step = |sums: [i32; N], coefficient: i32| -> [i32; N] {
         core::array::from_fn(|k| multiply_high_add(coefficient, sums[k], squares[k]))
     };

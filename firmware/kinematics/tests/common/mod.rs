@@ -65,6 +65,21 @@ impl Random {
     }
 }
 
+/// A unit whose every length and zero is off by up to 1.99 %.
+pub fn within_tolerance(random: &mut Random) -> Geometry {
+    let mut geometry = Geometry::PARALLEL_ACTUATORS;
+    for leg in &mut geometry.legs {
+        for k in 0..3 {
+            leg.center[k] += 0.0199 * random.sign();
+        }
+        leg.crank *= 1.0 + 0.0199 * random.sign();
+        leg.rod *= 1.0 + 0.0199 * random.sign();
+        let zero = 0.0199 * random.sign();
+        leg.zero = Vector3::new(0.0, zero.cos(), zero.sin());
+    }
+    geometry
+}
+
 pub fn angle(radians: f64) -> Angle {
     Angle::from_q29((radians * Q29).round() as i32)
 }

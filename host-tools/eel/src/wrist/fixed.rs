@@ -81,7 +81,7 @@ pub fn inverse(pose: [f64; 3]) -> Result<Inverse, &'static str> {
     let found = Wrist::PAPER.inverse(&pose_of(pose)?).map_err(reason)?;
     Ok(Inverse {
         theta: found.joints.0.map(radians),
-        margin: f64::from(found.margin) / Q30,
+        margin: f64::from(found.margin()) / Q30,
     })
 }
 
