@@ -9,6 +9,7 @@ use eel_units::{
 };
 
 use crate::pose::{Joints, Pose, PoseError};
+use crate::reach::ROOMS;
 use crate::vector::{Vector, dot, high, times_root_two, wide};
 use crate::wrist::{Pull, Wrist};
 
@@ -92,6 +93,48 @@ impl Wrist {
     }
 }
 
+impl Wrist {
+    /// Returns how far a pose of the kernel's range is from what the inverse refuses, in Q28: each
+    /// leg's D/2 above that of `margin`, each crank's and the third motor's way to its end, the
+    /// assembly room. Continuous; all positive where the inverse answers with that margin.
+    pub(crate) fn rooms(&self, pose: &Pose, margin: i32) -> [i32; ROOMS] {
+        let Platform {
+            points: [first, second],
+            normal,
+        } = pose.platform();
+        let least = high(wide(margin, margin)) >> 1; // half of its square, Q28
+        let [one, other] = [
+            self.legs[0].pull.room(&first, least),
+            self.legs[1].pull.room(&second, least),
+        ];
+        let [x, y, _] = first;
+        let third = ((y + x) >> 1) + ((y + x) >> 5) - (y - x).abs();
+        let bent = Solved {
+            half_tangent: other.half_tangent,
+            square: quadruple_square(other.half_tangent),
+            margin: 0,
+        };
+        [
+            one.square,
+            other.square,
+            one.turn,
+            other.turn,
+            third >> 2,
+            self.legs[1].pull.assembly_room(&normal, &bent),
+        ]
+    }
+}
+
+/// How far a leg is from its limits.
+struct Room {
+    /// D/2 less the least, Q28.
+    square: i32,
+    /// 17/32 (F + √D) − |G − E|, Q28.
+    turn: i32,
+    /// tan(θ/2) in Q31, held within ±17/32.
+    half_tangent: i32,
+}
+
 impl Pose {
     /// Tells whether yaw is within −1..1 rad, and pitch and roll within −½..½ rad.
     #[inline(always)]
@@ -158,6 +201,29 @@ impl Pull {
             square: quadruple_square(half_tangent),
             margin,
         })
+    }
+
+    /// Returns how far the leg is from its limits, for any point of the kernel's range.
+    fn room(&self, point: &Vector, least: i32) -> Room {
+        let e = point[1] - self.center[0];
+        let f = point[2] - self.center[1];
+        let g = self.offset - (dot(point, &self.slope) >> 30) as i32;
+        let square = wide(e, e) + wide(f, f) + wide(g, -g);
+        // Below the kernel's own margin as if it were that: continuous, and F + √D stays positive.
+        let top = high(square);
+        let root = if top < LEAST_SQUARE {
+            root_near(LEAST_SQUARE << 3)
+        } else {
+            root_near((square >> 29) as i32)
+        };
+        let below = f + root;
+        let end = (below >> 1) + (below >> 5);
+        let above = g.saturating_sub(e);
+        Room {
+            square: top - least,
+            turn: (end >> 2) - (above.saturating_abs() >> 2),
+            half_tangent: ratio_q30(above.clamp(-end, end) << 1, below),
+        }
     }
 
     /// Returns (W − ¾)(1 + tan²(θ/2)) of leg 2 in Q28: below zero where the assembly margin W is too small.

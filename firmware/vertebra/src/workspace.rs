@@ -1,6 +1,6 @@
 //! Targets as they are allowed: inside the workspace, no faster than the rate limit.
 
-use eel_kinematics::{Pose, Wrist};
+use eel_kinematics::{Pose, Reach, Wrist};
 use eel_units::{Angle, AngularVelocity, Duration, root_q30, saturate};
 
 use crate::settings::Limits;
@@ -20,7 +20,8 @@ impl Limited {
     pub const PITCH: u8 = 2;
     /// Roll was limited.
     pub const ROLL: u8 = 4;
-    /// The pose has no solution that is far enough from a singularity; the one before it stands.
+    /// The pose has no solution that is far enough from a singularity; the nearest that has one, or
+    /// the one before it, stands.
     pub const KINEMATICS: u8 = 8;
 
     /// Returns the bits, which are the detail of the emergency `target-limited`.
@@ -52,11 +53,22 @@ pub fn admit(
         }
         bounded
     };
-    let boxed = Pose {
+    let mut boxed = Pose {
         yaw: axis(wanted.yaw, range.yaw, Limited::YAW),
         pitch: axis(wanted.pitch, range.pitch, Limited::PITCH),
         roll: axis(wanted.roll, range.roll, Limited::ROLL),
     };
+    if wrist.inverse(&boxed).is_err() {
+        limited |= Limited::KINEMATICS;
+        let reach = Reach {
+            range: *range,
+            ..Reach::kernel()
+        };
+        // Without an answer the check below keeps the pose before.
+        if let Ok(nearest) = wrist.nearest(&boxed, &reach) {
+            boxed = nearest.pose;
+        }
+    }
     let step = largest_step(limits.rate, period);
     let near = |value: Angle, previous: Angle, range: Angle| {
         let up = step.min(braking_step(range - previous, period));
@@ -156,6 +168,37 @@ mod tests {
             (pose, last) = (next, speed);
         }
         assert_eq!(pose.yaw, settings().limits.workspace.yaw);
+    }
+
+    #[test]
+    fn a_corner_that_the_legs_do_not_reach_is_approached_as_far_as_they_do() {
+        let Settings {
+            mut limits, wrist, ..
+        } = settings();
+        let milliradians = Angle::from_milliradians;
+        limits.workspace = Pose {
+            yaw: milliradians(700),
+            pitch: milliradians(370),
+            roll: milliradians(90),
+        };
+        let corner = limits.workspace;
+        assert!(wrist.inverse(&corner).is_err());
+        let mut pose = Pose::default();
+        for _ in 0..100 {
+            let (next, limited) = admit(corner, pose, PERIOD, &limits, &wrist);
+            assert_eq!(limited.bits(), Limited::KINEMATICS);
+            assert!(wrist.inverse(&next).is_ok());
+            pose = next;
+        }
+        let missing = [
+            corner.yaw - pose.yaw,
+            corner.pitch - pose.pitch,
+            corner.roll - pose.roll,
+        ];
+        assert!(
+            missing.iter().all(|&angle| angle.abs() < milliradians(100)),
+            "{pose:?}"
+        );
     }
 
     #[test]
