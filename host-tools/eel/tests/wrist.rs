@@ -225,9 +225,37 @@ fn where_the_kernel_refuses_the_model_answers_and_says_why() {
         "{refusal}"
     );
     assert!(ik["theta_fixed"].is_null());
+    // What it reaches instead: as much roll as its range allows.
+    let nearest = &ik["nearest"];
+    assert_eq!(nearest["obstacle"], "range");
+    assert_close(&nearest["yaw"], &[0.0], 1e-3);
+    assert_close(&nearest["roll"], &[0.489], 1e-3);
     let (code, _, err) = eel(&[&["ik", "--kernel", "fixed"], &pose[..]].concat());
     assert_eq!(code, 2);
     assert!(err.contains("--kernel f64 answers"), "{err}");
+}
+
+#[test]
+fn what_no_leg_reaches_is_refused_with_the_nearest_pose() {
+    let pose = ["--yaw", "40", "--pitch", "-20", "--roll", "3", "--degrees"];
+    let (code, _, err) = eel(&[&["ik"], &pose[..]].concat());
+    assert_eq!(code, 2);
+    let (_, tail) = err
+        .split_once("yaw, pitch, roll = ")
+        .expect("the nearest pose");
+    let (angles, _) = tail.split_once(" (").expect("the workspace after it");
+    let angles: Vec<&str> = angles.split(", ").collect();
+    let again = json(&[
+        "ik",
+        "--degrees",
+        "--yaw",
+        angles[0],
+        "--pitch",
+        angles[1],
+        "--roll",
+        angles[2],
+    ]);
+    assert_eq!(again["kernel"], "fixed", "{err}");
 }
 
 #[test]

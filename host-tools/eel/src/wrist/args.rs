@@ -28,10 +28,11 @@ Examples:
 const IK_JSON: &str = "\
 --json: architecture, kernel (who gave theta), unit, pose, working_mode, assembly_mode (null on a
 singularity), theta (in that working mode), theta_f64, theta_fixed (null where the kernel does not answer;
-fixed_refusal says why), det_a, b, condition (of A), condition_of_rates (of B⁻¹A), isotropy and
-isotropy_of_rates (their inverses), manipulability (|det A|) and manipulability_of_rates (of A⁻¹B), margin
-(1 at home, 0 where a crank and its rod line up), travel (within, and the limit with the least room:
-coordinate, side, room); with --all solutions (four, home first) and working_modes (their names).";
+fixed_refusal says why, nearest what it reaches instead), det_a, b, condition (of A), condition_of_rates
+(of B⁻¹A), isotropy and isotropy_of_rates (their inverses), manipulability (|det A|) and
+manipulability_of_rates (of A⁻¹B), margin (1 at home, 0 where a crank and its rod line up), travel (within,
+and the limit with the least room: coordinate, side, room); with --all solutions (four, home first) and
+working_modes (their names).";
 
 const FK_JSON: &str = "\
 --json: architecture, kernel (who gave the pose), unit, theta, assembly_mode, phi, psi, yaw, pitch, roll,

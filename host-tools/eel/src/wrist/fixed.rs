@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use eel_kinematics::design::Matrix3;
-use eel_kinematics::{Direct, Joints, Pose, PoseError, Rotation, Wrist};
+use eel_kinematics::{Direct, Joints, Obstacle, Pose, PoseError, Reach, Rotation, Wrist};
 use eel_units::{Angle, Torque};
 
 use super::args::{Architecture, Common, Kernel};
@@ -82,6 +82,33 @@ pub fn inverse(pose: [f64; 3]) -> Result<Inverse, &'static str> {
     Ok(Inverse {
         theta: found.joints.0.map(radians),
         margin: f64::from(found.margin()) / Q30,
+    })
+}
+
+/// The pose nearest to one that the kernel does not reach.
+pub struct Nearest {
+    /// Yaw, pitch and roll in rad.
+    pub pose: [f64; 3],
+    /// Its motors' angles in rad.
+    pub theta: [f64; 3],
+    /// What is in the way of the pose that was asked.
+    pub obstacle: &'static str,
+}
+
+/// Returns the pose nearest to (yaw, pitch, roll) in rad that the kernel reaches; nothing where it
+/// reaches that.
+pub fn nearest(pose: [f64; 3]) -> Option<Nearest> {
+    let held = pose.map(|angle| angle.clamp(-MOST_RADIANS, MOST_RADIANS));
+    let found = Wrist::PAPER.nearest(&pose_of(held).ok()?, &Reach::kernel());
+    let found = found.ok()?;
+    Some(Nearest {
+        pose: [found.pose.yaw, found.pose.pitch, found.pose.roll].map(radians),
+        theta: found.inverse.joints.0.map(radians),
+        obstacle: match found.obstacle? {
+            Obstacle::Range => "range",
+            Obstacle::OutOfReach => "out-of-reach",
+            Obstacle::Singular => "singular",
+        },
     })
 }
 

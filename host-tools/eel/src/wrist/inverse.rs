@@ -23,6 +23,8 @@ struct Answer {
     theta_f64: [f64; 3],
     theta_fixed: Option<[f64; 3]>,
     fixed_refusal: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nearest: Option<NearestAnswer>,
     det_a: f64,
     b: [f64; 3],
     condition: f64,
@@ -44,6 +46,16 @@ struct Pose {
     yaw: f64,
     pitch: f64,
     roll: f64,
+}
+
+/// The nearest pose that the kernel reaches, where it refuses the one that is asked.
+#[derive(Serialize)]
+struct NearestAnswer {
+    yaw: f64,
+    pitch: f64,
+    roll: f64,
+    theta: [f64; 3],
+    obstacle: &'static str,
 }
 
 /// Answers `eel wrist ik`.
@@ -75,6 +87,16 @@ pub fn run(out: &mut dyn Write, ik: &Ik) -> Result<()> {
         theta_f64,
         theta_fixed,
         fixed_refusal: choice.refusal,
+        nearest: nearest(place.pose, &choice).map(|found| {
+            let [yaw, pitch, roll] = unit.show(found.pose);
+            NearestAnswer {
+                yaw,
+                pitch,
+                roll,
+                theta: unit.show(found.theta),
+                obstacle: found.obstacle,
+            }
+        }),
         det_a: place.jacobians.det_a(),
         b: place.jacobians.b.into(),
         condition: place.jacobians.condition(),
@@ -92,6 +114,11 @@ pub fn run(out: &mut dyn Write, ik: &Ik) -> Result<()> {
     };
     serde_json::to_writer(&mut *out, &answer)?;
     Ok(writeln!(out)?)
+}
+
+/// Returns the nearest pose that the kernel reaches where it refuses this one.
+fn nearest(pose: [f64; 3], choice: &Choice<fixed::Inverse>) -> Option<fixed::Nearest> {
+    choice.refusal.and_then(|_| fixed::nearest(pose))
 }
 
 fn write_text(
@@ -115,6 +142,18 @@ fn write_text(
     }
     if let Some(reason) = choice.refusal {
         writeln!(out, "  fixed    none: {reason}")?;
+    }
+    if let Some(found) = nearest(place.pose, choice) {
+        writeln!(
+            out,
+            "  nearest  {}  at yaw, pitch, roll {} ({} is in the way)",
+            unit.columns(&found.theta),
+            unit.columns(&found.pose)
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(", "),
+            found.obstacle,
+        )?;
     }
     writeln!(out, "  f64      {}", unit.columns(&place.theta))?;
     if ik.all {

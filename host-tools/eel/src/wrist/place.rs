@@ -9,7 +9,8 @@ use eel_kinematics::design::{
 };
 use serde::Serialize;
 
-use super::args::{At, PoseArguments, Subject};
+use super::args::{Architecture, At, PoseArguments, Subject};
+use super::fixed;
 use super::number::{Unit, plain};
 use super::refused;
 
@@ -55,7 +56,12 @@ impl Place {
             geometry.inverse_all(&rotation),
             geometry.inverse_in(mode, &rotation),
         ) else {
-            return Err(out_of_reach(&geometry, pose, &rotation));
+            let nearest = match subject.architecture {
+                Architecture::ParallelActuators => fixed::nearest(pose),
+                _ => None,
+            };
+            let nearest = nearest.map(|nearest| unit.columns(&nearest.pose));
+            return Err(out_of_reach(&geometry, pose, &rotation, nearest.as_deref()));
         };
         if rotation[(0, 0)].hypot(rotation[(1, 0)]) < LEAST_COS_PHI {
             return Err(refused(
@@ -148,7 +154,12 @@ fn orientation(asked: &PoseArguments, unit: Unit) -> Result<([f64; 3], Matrix3<f
 }
 
 /// Says which leg is too short, and how much of the pose is in reach.
-fn out_of_reach(geometry: &Geometry, pose: [f64; 3], rotation: &Matrix3<f64>) -> anyhow::Error {
+fn out_of_reach(
+    geometry: &Geometry,
+    pose: [f64; 3],
+    rotation: &Matrix3<f64>,
+    nearest: Option<&str>,
+) -> anyhow::Error {
     let reach = geometry.reach(rotation);
     let short: Vec<String> = (0..2)
         .filter(|leg| reach[*leg] < 0.0)
@@ -166,8 +177,15 @@ fn out_of_reach(geometry: &Geometry, pose: [f64; 3], rotation: &Matrix3<f64>) ->
         .take_while(|step| is_reached(f64::from(*step) / f64::from(steps)))
         .last()
         .unwrap_or(0);
+    let nearest = nearest.map_or_else(String::new, |columns| {
+        let words: Vec<&str> = columns.split_whitespace().collect();
+        format!(
+            "; the nearest pose that the firmware reaches is yaw, pitch, roll = {}",
+            words.join(", ")
+        )
+    });
     refused(format!(
-        "out of reach: leg {} can't get there; yaw, pitch and roll scaled by {:.3} are still in reach \
+        "out of reach: leg {} can't get there; yaw, pitch and roll scaled by {:.3} are still in reach{nearest} \
          (the paper's workspace is yaw ±30°, pitch ±15°, roll ±4°; angles are in radians without --degrees)",
         short.join(" and leg "),
         f64::from(reached) / f64::from(steps)
