@@ -222,7 +222,7 @@ impl Pull {
         Room {
             square: top - least,
             turn: (end >> 2) - (above.saturating_abs() >> 2),
-            half_tangent: ratio_q30(above.clamp(-end, end) << 1, below),
+            half_tangent: ratio_q30(above.max(-end).min(end) << 1, below),
         }
     }
 

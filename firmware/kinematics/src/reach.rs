@@ -113,7 +113,7 @@ impl Wrist {
         };
         let range = reach.box_q29();
         let wanted = target.to_array();
-        let boxed = [0, 1, 2].map(|axis| wanted[axis].clamp(-range[axis], range[axis]));
+        let boxed = [0, 1, 2].map(|axis| wanted[axis].max(-range[axis]).min(range[axis]));
         let mut pose = self.towards_home(boxed, reach);
         let mut best = pose;
         if pose != boxed {
@@ -253,7 +253,7 @@ fn project(planes: &mut [Plane; ROOMS], wanted: &[i32; 3], range: &[i32; 3]) -> 
     for _ in 0..SWEEPS {
         for axis in 0..3 {
             let free = point[axis] - held[axis];
-            point[axis] = free.clamp(-range[axis], range[axis]);
+            point[axis] = free.max(-range[axis]).min(range[axis]);
             held[axis] = point[axis] - free;
         }
         for plane in planes.iter_mut() {
@@ -268,7 +268,7 @@ fn project(planes: &mut [Plane; ROOMS], wanted: &[i32; 3], range: &[i32; 3]) -> 
         }
     }
     [0, 1, 2].map(|axis| {
-        let bounded = point[axis].clamp(-range[axis], range[axis]);
+        let bounded = point[axis].max(-range[axis]).min(range[axis]);
         saturate(bounded << 5)
     })
 }
