@@ -221,7 +221,7 @@ fn every_geometry_within_tolerance_keeps_the_error_bounds() {
         let geometry = common::within_tolerance(&mut random);
         let kernel = geometry.kernel().unwrap();
         for _ in 0..50 {
-            let pose = pose_of(random.pose(0.9));
+            let pose = pose_of(random.pose(1.0));
             let exact = exact_rotation(&pose);
             let Some(wanted) = geometry.inverse(&exact) else {
                 refused += 1;
@@ -248,7 +248,8 @@ fn every_geometry_within_tolerance_keeps_the_error_bounds() {
         round_trip * 1e6
     );
     assert!(
-        worst <= 0.03e-6 && round_trip <= 0.05e-6 && refused == 0,
+        // A unit at the end of the tolerance may lack a corner of the workspace.
+        worst <= 0.03e-6 && round_trip <= 0.05e-6 && refused <= 100,
         "{worst:e} {round_trip:e}"
     );
 }

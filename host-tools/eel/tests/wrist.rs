@@ -293,6 +293,46 @@ fn torques_keep_their_bounds_and_yaw_comes_first() {
 }
 
 #[test]
+fn a_moment_keeps_its_direction_where_that_is_asked() {
+    for kernel in ["fixed", "f64"] {
+        let ask = |policy: &str| {
+            json(&[
+                "torque",
+                "--moment",
+                "-2,0.5,0.2",
+                "--yaw",
+                "0.3",
+                "--limits",
+                "-0.6,0.6",
+                "--kernel",
+                kernel,
+                "--policy",
+                policy,
+            ])
+        };
+        let kept = ask("keep-direction");
+        assert_eq!(kept["policy"], "keep-direction");
+        let achieved = numbers(&kept["achieved"]);
+        let fraction = achieved[0] / -2.0;
+        assert!(fraction > 0.3 && fraction < 0.9, "{achieved:?}");
+        assert_close(
+            &kept["achieved"],
+            &[-2.0, 0.5, 0.2].map(|m| m * fraction),
+            1e-6,
+        );
+        // Yaw first gives more yaw.
+        let first = numbers(&ask("yaw-first")["achieved"]);
+        assert!(first[0] < achieved[0] - 0.05, "{first:?} {achieved:?}");
+    }
+    let (code, _, err) = eel(&["torque", "--moment", "1,0,0", "--policy", "clip"]);
+    assert_eq!(code, 2);
+    assert!(
+        err.contains("yaw-first") && err.contains("keep-direction"),
+        "{err}"
+    );
+}
+
+#[test]
 fn the_jacobian_makes_the_motors_rates_and_the_two_torque_maps_agree() {
     let at = |yaw: &str| json(&["jacobian", "--yaw", yaw, "--pitch", "0.1"]);
     let (here, less, more) = (at("0.4"), at("0.39999"), at("0.40001"));
