@@ -131,30 +131,36 @@ impl Jacobian {
     /// Grants yaw, then pitch, then roll, each as far as the motors still can.
     #[inline(always)]
     fn grant_in_turn(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3]) {
-        let rows = self.torque_rows();
-        for (axis, component) in moment.iter_mut().enumerate() {
-            let entry = |motor: usize| rows.get(motor).map_or(0, |row: &Vector| row[axis % 3]);
-            let fraction = feasible(motors, |motor| part(entry(motor), *component));
+        let [first, second, third] = self.torque_rows();
+        for axis in 0..3 {
+            let ask = |component: i32| {
+                [
+                    part(first[axis], component),
+                    part(second[axis], component),
+                    part(third[axis], component),
+                ]
+            };
+            let mut wanted = ask(moment[axis]);
+            let fraction = feasible(motors, &wanted);
             if fraction < WHOLE {
-                *component = fraction_of(*component, fraction);
+                moment[axis] = fraction_of(moment[axis], fraction);
+                wanted = ask(moment[axis]);
             }
-            for (index, motor) in motors.iter_mut().enumerate() {
-                motor.torque += part(entry(index), *component);
+            for (motor, wanted) in motors.iter_mut().zip(wanted) {
+                motor.torque += wanted;
             }
         }
     }
 
     /// Grants the same fraction of all three.
     fn grant_alike(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3]) {
-        let rows = self.torque_rows();
-        let torque = |motor: usize, moment: &Vector| {
-            rows.get(motor)
-                .map_or(0, |row| (dot(row, moment) >> 26) as i32)
-        };
-        let fraction = feasible(motors, |motor| torque(motor, moment));
+        let [first, second, third] = self.torque_rows();
+        let ask =
+            |moment: &Vector| [first, second, third].map(|row| (dot(row, moment) >> 26) as i32);
+        let fraction = feasible(motors, &ask(moment));
         *moment = moment.map(|component| fraction_of(component, fraction));
-        for (index, motor) in motors.iter_mut().enumerate() {
-            motor.torque = torque(index, moment);
+        for (motor, torque) in motors.iter_mut().zip(ask(moment)) {
+            motor.torque = torque;
         }
     }
 }
@@ -201,11 +207,10 @@ impl Motor {
 
 /// Returns the largest fraction of `wanted` that the motors can add, Q30, and notes who bounds it.
 #[inline(always)]
-fn feasible(motors: &mut [Motor; 3], wanted: impl Fn(usize) -> i32) -> i32 {
+fn feasible(motors: &mut [Motor; 3], wanted: &[i32; 3]) -> i32 {
     let mut fraction = WHOLE;
     let mut tightest = None;
-    for (index, motor) in motors.iter_mut().enumerate() {
-        let wanted = wanted(index);
+    for (motor, &wanted) in motors.iter_mut().zip(wanted) {
         let (room, side) = if wanted < 0 {
             (motor.torque.wrapping_sub(motor.low) as u32, Side::Low)
         } else {
