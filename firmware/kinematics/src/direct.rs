@@ -197,11 +197,12 @@ impl Root {
         let margin = root_near((square >> 29) as i32);
         // N + K is below 3.7; where it is not positive one of the tests holds.
         let below = n - k;
-        let above = if SIDE < 0 { margin - m } else { m - margin } << 1;
-        if above >= below || above <= -below {
+        let above = if SIDE < 0 { margin - m } else { m - margin };
+        let half = below >> 1;
+        if above >= half || above <= -half {
             return Err(PoseError::OutOfReach);
         }
-        let tangent = ratio_q30(above, below); // Q31, of half the angle
+        let tangent = ratio_q30(above << 1, below); // Q31, of half the angle
         let square = multiply_high(tangent, tangent) >> 1; // Q29
         // cos α = (1 − t²)/(1 + t²), one step short of 1; sin α = 2t − 2t (1 − cos α)/2.
         let cosine = ratio_q30((1 << 29) - 1 - square, (1 << 29) + square);
