@@ -1,10 +1,12 @@
 //! `eel wrist` as its users call it: golden vectors, the paper's figures, refusals.
 
+mod common;
+
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
+use common::{eel, json, numbers};
 use serde_json::Value;
 
 const ARCHITECTURES: [&str; 3] = ["parallel-axes", "orthogonal-axes", "parallel-actuators"];
@@ -16,33 +18,6 @@ const FIG_13: [&str; 6] = [
     "--psi",
     "0.2617993877991494",
 ];
-
-fn eel(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_eel"))
-        .arg("wrist")
-        .args(arguments)
-        .output()
-        .unwrap();
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-    (
-        output.status.code().unwrap(),
-        text(&output.stdout),
-        text(&output.stderr),
-    )
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let mut all = arguments.to_vec();
-    all.push("--json");
-    let (code, out, err) = eel(&all);
-    assert_eq!(code, 0, "{arguments:?}: {err}");
-    serde_json::from_str(&out).unwrap()
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    let list = value.as_array().unwrap_or_else(|| panic!("{value}"));
-    list.iter().map(|number| number.as_f64().unwrap()).collect()
-}
 
 fn assert_close(found: &Value, wanted: &[f64], tolerance: f64) {
     let found = match found {

@@ -1,4 +1,4 @@
-//! What the tests of drawings share: the command as its users call it, and what every drawing must have.
+//! What the tests of `eel wrist` share: the command as its users call it, and what every drawing must have.
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::process::Command;
