@@ -244,7 +244,8 @@ impl Pull {
 #[inline(always)]
 fn small_ratio(number: i32, divisor: i32) -> Option<i32> {
     let reach = (divisor >> 1) + (divisor >> 5);
-    if (number + reach) as u32 >= (reach << 1) as u32 {
+    // A sum beyond 2³¹ wraps to more than twice the reach: refused all the same.
+    if number.wrapping_add(reach) as u32 >= (reach << 1) as u32 {
         return None;
     }
     Some(ratio_q30(number << 1, divisor))

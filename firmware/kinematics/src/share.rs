@@ -59,16 +59,20 @@ pub struct Shared {
 /// All of it, as a fraction in Q30.
 const WHOLE: i32 = 1 << 30;
 
-/// By how much a component may pass a motor's bound without being cut for it: 0.5 µN·m in Q24.
+/// By how much a component may pass a motor's bound without being cut for it: 0.5 µN·m in Q24, and two
+/// steps where steps are coarser.
 const SLACK: u32 = 8;
+const LEAST_SLACK: u32 = 2;
+/// More than a motor can be past its bound, in steps: the slack and three roundings.
+const PASSED: u32 = 64;
 
 impl Jacobian {
     /// Shares a moment among the motors within their bounds.
     ///
     /// A motor at its bound may be passed by 0.5 µN·m, which it then does not give: without that, a
     /// coupling of parts in 10⁹ to a motor at its bound would refuse a whole component. So the
-    /// achieved moment is what the torques make to 10 µN·m, or to a part in 10⁷ of a moment beyond
-    /// 8 N·m. Where nothing is bounded the torques are those of [`Jacobian::torques`] to one step.
+    /// achieved moment is what the torques make to 3 µN·m in the paper's workspace (11 at the least
+    /// margins), or to 4 parts in 10⁷ of a moment beyond 8 N·m (2 in 10⁶). Where nothing is bounded the torques are those of [`Jacobian::torques`] to one step.
     #[inline]
     pub fn share(&self, moment: &[Torque; 3], bounds: &[Bounds; 3], policy: Policy) -> Shared {
         match self.share_whole(moment, bounds) {
@@ -106,12 +110,13 @@ impl Jacobian {
         let asked = moment.map(Torque::to_q24);
         let size = asked.map(i32::unsigned_abs);
         let shift = 5u32.saturating_sub((size[0] | size[1] | size[2]).leading_zeros());
+        let slack = (SLACK >> shift).max(LEAST_SLACK);
         let asked = asked.map(|component| component >> shift);
         let mut motors = bounds.each_ref().map(|bound| Motor::new(bound, shift));
         let mut granted = asked;
         match policy {
-            Policy::YawFirst => self.grant_in_turn(&mut motors, &mut granted),
-            Policy::KeepDirection => self.grant_alike(&mut motors, &mut granted),
+            Policy::YawFirst => self.grant_in_turn(&mut motors, &mut granted, slack),
+            Policy::KeepDirection => self.grant_alike(&mut motors, &mut granted, slack),
         }
         let achieved = [0, 1, 2].map(|axis| {
             if granted[axis] == asked[axis] {
@@ -130,7 +135,7 @@ impl Jacobian {
 
     /// Grants yaw, then pitch, then roll, each as far as the motors still can.
     #[inline(always)]
-    fn grant_in_turn(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3]) {
+    fn grant_in_turn(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3], slack: u32) {
         let [first, second, third] = self.torque_rows();
         for axis in 0..3 {
             let ask = |component: i32| {
@@ -141,7 +146,7 @@ impl Jacobian {
                 ]
             };
             let mut wanted = ask(moment[axis]);
-            let fraction = feasible(motors, &wanted);
+            let fraction = feasible(motors, &wanted, slack);
             if fraction < WHOLE {
                 moment[axis] = fraction_of(moment[axis], fraction);
                 wanted = ask(moment[axis]);
@@ -153,11 +158,11 @@ impl Jacobian {
     }
 
     /// Grants the same fraction of all three.
-    fn grant_alike(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3]) {
+    fn grant_alike(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3], slack: u32) {
         let [first, second, third] = self.torque_rows();
         let ask =
             |moment: &Vector| [first, second, third].map(|row| (dot(row, moment) >> 26) as i32);
-        let fraction = feasible(motors, &ask(moment));
+        let fraction = feasible(motors, &ask(moment), slack);
         *moment = moment.map(|component| fraction_of(component, fraction));
         for (motor, torque) in motors.iter_mut().zip(ask(moment)) {
             motor.torque = torque;
@@ -207,7 +212,7 @@ impl Motor {
 
 /// Returns the largest fraction of `wanted` that the motors can add, Q30, and notes who bounds it.
 #[inline(always)]
-fn feasible(motors: &mut [Motor; 3], wanted: &[i32; 3]) -> i32 {
+fn feasible(motors: &mut [Motor; 3], wanted: &[i32; 3], slack: u32) -> i32 {
     let mut fraction = WHOLE;
     let mut tightest = None;
     for (motor, &wanted) in motors.iter_mut().zip(wanted) {
@@ -217,11 +222,11 @@ fn feasible(motors: &mut [Motor; 3], wanted: &[i32; 3]) -> i32 {
             (motor.high.wrapping_sub(motor.torque) as u32, Side::High)
         };
         // A motor that passed its bound within the slack has no room: none, not 2³².
-        let room = if room > u32::MAX - 8 * SLACK { 0 } else { room };
+        let room = if room > u32::MAX - PASSED { 0 } else { room };
         let need = wanted.unsigned_abs();
-        if need > room && need - room > SLACK {
-            // Less the quotient's error of 2.8e-9.
-            let feasible = quotient_q30((room + SLACK) as i32, need as i32) - 3;
+        if need > room && need - room > slack {
+            // Less the quotient's error of 4.7e-9.
+            let feasible = quotient_q30((room + slack) as i32, need as i32) - 5;
             if feasible < fraction {
                 fraction = feasible;
                 tightest = Some((motor, side));
@@ -240,8 +245,10 @@ fn part(entry: i32, component: i32) -> i32 {
     (wide(entry, component) >> 26) as i32
 }
 
-/// Returns a fraction (Q30) of a component, rounded down.
+/// Returns a fraction (Q30) of a component, rounded towards zero.
 #[inline(always)]
 fn fraction_of(component: i32, fraction: i32) -> i32 {
-    (wide(component, fraction) >> 30) as i32
+    let product = wide(component, fraction);
+    let up = (product >> 63) & ((1 << 30) - 1);
+    ((product + up) >> 30) as i32
 }

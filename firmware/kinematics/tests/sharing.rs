@@ -175,6 +175,38 @@ fn sharing_finds_what_a_search_finds_and_never_flips_yaw() {
 }
 
 #[test]
+fn what_is_achieved_is_what_the_torques_make_however_large_the_moment() {
+    let mut random = Random::new(0x5A7E_0000_0000_0004);
+    let mut worst = 0.0f64;
+    for round in 0..20_000 {
+        let mut case = Case::random(&mut random);
+        case.moment = random.vector(if round % 2 == 0 { 120.0 } else { 20.0 });
+        let size = case
+            .moment
+            .iter()
+            .fold(8.0, |size: f64, m| size.max(m.abs()));
+        for policy in [Policy::YawFirst, Policy::KeepDirection] {
+            let shared = case.share_by(policy);
+            let made = case.jacobian.moment(shared.torque).map(newton_metres);
+            for (axis, made) in made.into_iter().enumerate() {
+                let achieved = newton_metres(shared.achieved[axis]);
+                worst = worst.max((made - achieved).abs() / size);
+                // Something is missing where a motor is named, and the other way round.
+                assert!(achieved * case.moment[axis] >= 0.0);
+            }
+            let missing = shared.unallocated.iter().any(|&rest| rest != Torque::ZERO);
+            assert_eq!(
+                missing,
+                shared.bound.iter().any(Option::is_some),
+                "{shared:?}"
+            );
+        }
+    }
+    println!("achieved against made: {worst:.1e} of the moment");
+    assert!(worst <= 4e-7, "{worst:e}");
+}
+
+#[test]
 fn keeping_the_direction_grants_the_largest_common_fraction() {
     let mut random = Random::new(0x5A7E_0000_0000_0003);
     let (mut cases, mut worst, mut turned) = (0, 0.0f64, 0.0f64);

@@ -5,7 +5,8 @@
 //! The functions state their error, and the tests hold them to it.
 //! What is deliberately absent: floats, clocks, and quantities that no firmware crate uses.
 //!
-//! `unsafe` is denied, not forbidden, for two divide instructions in `machine.rs`.
+//! `unsafe` is denied, not forbidden, for `machine.rs`: two multiply and two divide
+//! instructions, and a table whose place is hidden from the compiler.
 #![no_std]
 #![deny(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
