@@ -32,7 +32,7 @@ pub const fn round_shift_saturating<const BITS: u32>(value: i64) -> i32 {
 
 /// Returns `number / divisor` in Q30 for a divisor from 2²⁸ on and |number| ≤ divisor.
 ///
-/// Wrong by at most 2.8e-9 for a divisor from 2²⁹ on and 1.4e-8 below. The number may pass the divisor by a
+/// Wrong by at most 3.8e-9 for a divisor from 2²⁹ on and 1.5e-8 below. The number may pass the divisor by a
 /// sixteenth. Beyond that the answer is meaningless, and no more than that.
 ///
 /// Long division with two digits of 15 bits, each by one SDIV; the remainder between them is exact.
@@ -88,7 +88,7 @@ pub fn root_q30(square: u32) -> i32 {
     }
 }
 
-/// Returns `number / divisor` in Q30 for |number| ≤ divisor of any size, wrong by at most 2.8e-9.
+/// Returns `number / divisor` in Q30 for |number| ≤ divisor of any size, wrong by at most 3.8e-9.
 ///
 /// Beyond that range the answer is meaningless; a divisor of zero or less counts as 1.
 #[inline]
