@@ -59,20 +59,17 @@ pub struct Shared {
 /// All of it, as a fraction in Q30.
 const WHOLE: i32 = 1 << 30;
 
-/// By how much a component may pass a motor's bound without being cut for it: 0.5 µN·m in Q24, and two
-/// steps where steps are coarser.
-const SLACK: u32 = 8;
-const LEAST_SLACK: u32 = 2;
-/// More than a motor can be past its bound, in steps: the slack and three roundings.
-const PASSED: u32 = 64;
+/// By how much a component may pass a motor's bound without being cut for it, in Q20: 1 µN·m.
+const SLACK: i32 = 1;
 
 impl Jacobian {
     /// Shares a moment among the motors within their bounds.
     ///
-    /// A motor at its bound may be passed by 0.5 µN·m, which it then does not give: without that, a
+    /// A motor at its bound may be passed by 1 µN·m, which it then does not give: without that, a
     /// coupling of parts in 10⁹ to a motor at its bound would refuse a whole component. So the
-    /// achieved moment is what the torques make to 3 µN·m in the paper's workspace (11 at the least
-    /// margins), or to 4 parts in 10⁷ of a moment beyond 8 N·m (2 in 10⁶). Where nothing is bounded the torques are those of [`Jacobian::torques`] to one step.
+    /// achieved moment is what the torques make to 10 µN·m in the paper's workspace, whatever its size,
+    /// and to 40 µN·m at the least margins. A component of a few steps may count as granted whole while a
+    /// motor is named. Where nothing is bounded the torques are those of [`Jacobian::torques`] to one step.
     #[inline]
     pub fn share(&self, moment: &[Torque; 3], bounds: &[Bounds; 3], policy: Policy) -> Shared {
         match self.share_whole(moment, bounds) {
@@ -106,66 +103,55 @@ impl Jacobian {
     /// Shares a moment that is too much for a motor.
     #[inline(never)]
     fn share_part(&self, moment: &[Torque; 3], bounds: &[Bounds; 3], policy: Policy) -> Shared {
-        // Below 8 N·m, so that no motor's part of it passes 120.
         let asked = moment.map(Torque::to_q24);
-        let size = asked.map(i32::unsigned_abs);
-        let shift = 5u32.saturating_sub((size[0] | size[1] | size[2]).leading_zeros());
-        let slack = (SLACK >> shift).max(LEAST_SLACK);
-        let asked = asked.map(|component| component >> shift);
-        let mut motors = bounds.each_ref().map(|bound| Motor::new(bound, shift));
+        let mut motors = Motors::new(bounds);
         let mut granted = asked;
         match policy {
-            Policy::YawFirst => self.grant_in_turn(&mut motors, &mut granted, slack),
-            Policy::KeepDirection => self.grant_alike(&mut motors, &mut granted, slack),
-        }
-        let achieved = [0, 1, 2].map(|axis| {
-            if granted[axis] == asked[axis] {
-                moment[axis]
-            } else {
-                Torque::from_q24(granted[axis] << shift)
+            Policy::YawFirst => {
+                for axis in 0..3 {
+                    let mut alone = [0; 3];
+                    alone[axis] = asked[axis];
+                    self.grant(&mut motors, &mut alone);
+                    granted[axis] = alone[axis];
+                }
             }
-        });
+            Policy::KeepDirection => self.grant(&mut motors, &mut granted),
+        }
+        let achieved = granted.map(Torque::from_q24);
         Shared {
-            torque: motors.each_ref().map(|motor| motor.give(shift)),
+            torque: [0, 1, 2].map(|motor| motors.give(motor)),
             achieved,
             unallocated: [0, 1, 2].map(|axis| moment[axis] - achieved[axis]),
-            bound: motors.map(|motor| motor.bound),
+            bound: motors.bound,
         }
     }
 
-    /// Grants yaw, then pitch, then roll, each as far as the motors still can.
-    #[inline(always)]
-    fn grant_in_turn(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3], slack: u32) {
-        let [first, second, third] = self.torque_rows();
-        for axis in 0..3 {
-            let ask = |component: i32| {
-                [
-                    part(first[axis], component),
-                    part(second[axis], component),
-                    part(third[axis], component),
-                ]
-            };
-            let mut wanted = ask(moment[axis]);
-            let fraction = feasible(motors, &wanted, slack);
-            if fraction < WHOLE {
-                moment[axis] = fraction_of(moment[axis], fraction);
-                wanted = ask(moment[axis]);
-            }
-            for (motor, wanted) in motors.iter_mut().zip(wanted) {
-                motor.torque += wanted;
+    /// Cuts a moment (Q24) to the fraction of it that the motors still can, and lets them give that.
+    ///
+    /// One place for both policies, out of line: yaw first calls it for each axis alone.
+    #[inline(never)]
+    fn grant(&self, motors: &mut Motors, moment: &mut Vector) {
+        // Q50 to Q20: within 1920 N·m.
+        let parts = self
+            .torque_rows()
+            .map(|row| (dot(&row, moment) >> 30) as i32);
+        let (mut fraction, mut tightest) = (WHOLE, 0);
+        for index in 0..3 {
+            let feasible = motors.feasible(index, parts[index]);
+            if feasible < fraction {
+                (fraction, tightest) = (feasible, index);
             }
         }
-    }
-
-    /// Grants the same fraction of all three.
-    fn grant_alike(&self, motors: &mut [Motor; 3], moment: &mut [i32; 3], slack: u32) {
-        let [first, second, third] = self.torque_rows();
-        let ask =
-            |moment: &Vector| [first, second, third].map(|row| (dot(row, moment) >> 26) as i32);
-        let fraction = feasible(motors, &ask(moment), slack);
-        *moment = moment.map(|component| fraction_of(component, fraction));
-        for (motor, torque) in motors.iter_mut().zip(ask(moment)) {
-            motor.torque = torque;
+        for index in 0..3 {
+            moment[index] = fraction_of(moment[index], fraction);
+            motors.torque[index] += fraction_of(parts[index], fraction);
+        }
+        if fraction < WHOLE {
+            motors.bound[tightest] = Some(if parts[tightest] < 0 {
+                Side::Low
+            } else {
+                Side::High
+            });
         }
     }
 }
@@ -182,73 +168,60 @@ impl Bounds {
     }
 }
 
-/// A motor while a moment is shared; torques in Q24 over 2^shift.
-struct Motor {
-    low: i32,
-    high: i32,
-    /// What it gives so far, within the bounds but for the slack.
-    torque: i32,
-    bound: Option<Side>,
+/// The motors while a moment is shared; torques in Q20, which holds what any moment asks.
+struct Motors {
+    low: Vector,
+    high: Vector,
+    /// What they give so far, within the bounds but for the slack.
+    torque: Vector,
+    bound: [Option<Side>; 3],
 }
 
-impl Motor {
-    /// Makes a motor that gives nothing yet; its bounds are rounded towards zero.
+impl Motors {
+    /// Makes motors that give nothing yet; their bounds are rounded towards zero.
     #[inline(always)]
-    fn new(bounds: &Bounds, shift: u32) -> Self {
+    fn new(bounds: &[Bounds; 3]) -> Self {
         Self {
-            low: (bounds.low.to_q24().min(0) + ((1 << shift) - 1)) >> shift,
-            high: bounds.high.to_q24().max(0) >> shift,
-            torque: 0,
-            bound: None,
+            low: [0, 1, 2].map(|k| (bounds[k].low.to_q24().min(0) + 15) >> 4),
+            high: [0, 1, 2].map(|k| bounds[k].high.to_q24().max(0) >> 4),
+            torque: [0; 3],
+            bound: [None; 3],
         }
     }
 
-    /// Returns what it gives.
+    /// Returns what a motor gives.
     #[inline(always)]
-    fn give(&self, shift: u32) -> Torque {
-        Torque::from_q24(self.torque.max(self.low).min(self.high) << shift)
+    fn give(&self, index: usize) -> Torque {
+        let held = self.torque[index]
+            .max(self.low[index])
+            .min(self.high[index]);
+        Torque::from_q24(held << 4)
     }
-}
 
-/// Returns the largest fraction of `wanted` that the motors can add, Q30, and notes who bounds it.
-#[inline(always)]
-fn feasible(motors: &mut [Motor; 3], wanted: &[i32; 3], slack: u32) -> i32 {
-    let mut fraction = WHOLE;
-    let mut tightest = None;
-    for (motor, &wanted) in motors.iter_mut().zip(wanted) {
-        let (room, side) = if wanted < 0 {
-            (motor.torque.wrapping_sub(motor.low) as u32, Side::Low)
+    /// Returns the largest fraction of `wanted` that a motor can add, Q30.
+    ///
+    /// Out of line: three calls are smaller than three copies.
+    #[inline(never)]
+    fn feasible(&self, index: usize, wanted: i32) -> i32 {
+        let torque = self.torque[index];
+        let room = if wanted < 0 {
+            torque - self.low[index]
         } else {
-            (motor.high.wrapping_sub(motor.torque) as u32, Side::High)
+            self.high[index] - torque
         };
-        // A motor that passed its bound within the slack has no room: none, not 2³².
-        let room = if room > u32::MAX - PASSED { 0 } else { room };
-        let need = wanted.unsigned_abs();
-        if need > room && need - room > slack {
-            // Less the quotient's error of 4.7e-9.
-            let feasible = quotient_q30((room + slack) as i32, need as i32) - 5;
-            if feasible < fraction {
-                fraction = feasible;
-                tightest = Some((motor, side));
-            }
+        // A motor may have passed its bound within the slack.
+        let room = room.max(0) + SLACK;
+        let need = wanted.abs();
+        if need <= room {
+            return WHOLE;
         }
+        // Less the quotient's error of 1.9e-9.
+        (quotient_q30(room, need) - 2).max(0)
     }
-    if let Some((motor, side)) = tightest {
-        motor.bound = Some(side);
-    }
-    fraction.max(0)
 }
 
-/// Returns what a component asks of a motor: Q26 · Q24 to Q24.
+/// Returns a fraction (Q30) of a number, rounded down: never of the other sign, never larger.
 #[inline(always)]
-fn part(entry: i32, component: i32) -> i32 {
-    (wide(entry, component) >> 26) as i32
-}
-
-/// Returns a fraction (Q30) of a component, rounded towards zero.
-#[inline(always)]
-fn fraction_of(component: i32, fraction: i32) -> i32 {
-    let product = wide(component, fraction);
-    let up = (product >> 63) & ((1 << 30) - 1);
-    ((product + up) >> 30) as i32
+fn fraction_of(number: i32, fraction: i32) -> i32 {
+    (wide(number, fraction) >> 30) as i32
 }

@@ -94,10 +94,7 @@ pub fn root_q30(square: u32) -> i32 {
 #[inline]
 pub fn quotient_q30(number: i32, divisor: i32) -> i32 {
     let divisor = divisor.max(1);
-    let lead = divisor.leading_zeros();
-    if lead < 2 {
-        ratio_q30(number >> 1, divisor >> 1)
-    } else {
-        ratio_q30(number << (lead - 2), divisor << (lead - 2))
-    }
+    // The divisor to 2³⁰..2³¹, where a ratio is most exact.
+    let lead = divisor.leading_zeros().wrapping_sub(1) & 31;
+    ratio_q30(number << lead, divisor << lead)
 }

@@ -5,8 +5,6 @@
 //! Armv7-M, which it finds. A division is SDIV or UDIV, which give zero for a divisor of zero where
 //! Rust would have to ask first. Elsewhere plain Rust gives the same bits.
 
-use crate::coefficients::{COEFFICIENTS, Coefficients};
-
 /// Returns `a · b / 2³²`, rounded down.
 ///
 /// Qm times Qn gives Q(m + n − 32). No input overflows.
@@ -107,14 +105,14 @@ pub fn divide_unsigned(number: u32, divisor: u32) -> u32 {
     }
 }
 
-/// Returns the coefficients, from a place that the compiler does not know.
+/// Returns a table from a place that the compiler does not know.
 ///
-/// It then loads each with one instruction instead of making it with two.
+/// It then loads each number with one instruction instead of making it with two.
 #[inline(always)]
-pub(crate) fn coefficients() -> &'static Coefficients {
+pub(crate) fn from_memory<Table>(table: &'static Table) -> &'static Table {
     #[cfg(target_arch = "arm")]
     {
-        let mut place: *const Coefficients = &COEFFICIENTS;
+        let mut place: *const Table = table;
         // SAFETY: no instruction at all: the address of a static comes back as it went in.
         #[expect(unsafe_code, reason = "hides where the address comes from")]
         unsafe {
@@ -128,6 +126,6 @@ pub(crate) fn coefficients() -> &'static Coefficients {
     }
     #[cfg(not(target_arch = "arm"))]
     {
-        &COEFFICIENTS
+        table
     }
 }

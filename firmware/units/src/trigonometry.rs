@@ -2,7 +2,8 @@
 
 use crate::Angle;
 use crate::arithmetic::quotient_q30;
-use crate::machine::{coefficients, multiply_high, multiply_high_add};
+use crate::coefficients::{ANGLE_OVER_SINE, COEFFICIENTS};
+use crate::machine::{from_memory, multiply_high, multiply_high_add};
 
 /// Returns sine and cosine in Q30 of angles within −1..1 rad, wrong by at most 2.8e-9 each.
 ///
@@ -17,7 +18,7 @@ pub fn sin_cos_near<const N: usize>(angles: [Angle; N]) -> [(i32, i32); N] {
 /// Sine and cosine in Q30 of angles in Q31 radians.
 #[inline(always)]
 fn sin_cos_q31<const N: usize>(angles: [i32; N]) -> [(i32, i32); N] {
-    let table = coefficients();
+    let table = from_memory(&COEFFICIENTS);
     let [s0, s1, s2, s3, s4] = table.sine;
     let [c1, c2, c3, c4] = table.cosine;
     // a² in Q30.
@@ -56,7 +57,7 @@ pub fn quadruple_square(tangent: i32) -> i32 {
 /// Returns the same as [`arctangents`], given each tangent's [`quadruple_square`].
 #[inline(always)]
 pub fn arctangents_of<const N: usize>(tangents: [i32; N], squares: [i32; N]) -> [i32; N] {
-    let [p0, p1, p2, p3, p4, p5, p6] = coefficients().arctangent;
+    let [p0, p1, p2, p3, p4, p5, p6] = from_memory(&COEFFICIENTS).arctangent;
     let step = |sums: [i32; N], coefficient: i32| -> [i32; N] {
         core::array::from_fn(|k| multiply_high_add(coefficient, sums[k], squares[k]))
     };
@@ -147,7 +148,7 @@ pub fn angle_over_sine(cosine: i32) -> i32 {
     } else {
         (difference << 1) as i32
     };
-    let [c0, c1, c2, c3, c4, c5, c6] = coefficients().angle_over_sine;
+    let [c0, c1, c2, c3, c4, c5, c6] = *from_memory(&ANGLE_OVER_SINE);
     let p = multiply_high_add(c4, multiply_high_add(c5, c6, h), h);
     let p = multiply_high_add(c2, multiply_high_add(c3, p, h), h);
     multiply_high_add(c0, multiply_high_add(c1, p, h), h)

@@ -1,214 +1,302 @@
-//! Instructions of the wrist's kernel, counted in QEMU and held to a budget.
+//! What the wrist's kernel costs and how exact it is: instructions in QEMU, bytes of flash, errors, and
+//! whether every machine answers with the same bits.
 //!
-//! The image prints ticks of virtual time, one line a pose; what a loop alone takes is subtracted
-//! here. Instructions are no cycles, and no stand-in for a measurement on silicon.
+//! Instructions are no cycles, and no stand-in for a measurement on silicon.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
+use crate::counts::Counts;
 use crate::cross;
+use crate::errors::Errors;
+use crate::image::Image;
 use crate::process::{self, cargo, clean_root, command, output, run as run_command};
 
 /// A processor that is measured, and the machine of QEMU that has it.
-struct Core {
-    name: &'static str,
+pub struct Core {
+    /// Its name in the budget.
+    pub name: &'static str,
     target: &'static str,
     machine: &'static str,
     /// SysTick's ticks in 1000 instructions: the machine's clock in MHz.
-    ticks: f64,
+    pub ticks: f64,
+    /// The most flash that the kernel may take, in bytes, where a vertebra has this processor.
+    ceiling: Option<u64>,
 }
 
-const CORES: [Core; 2] = [
+/// The vertebra's processor, and one without floats and DSP instructions.
+pub const CORES: [Core; 2] = [
     Core {
         name: "cortex-m4",
         target: cross::TARGET,
         machine: "netduinoplus2",
         ticks: 168.0,
+        ceiling: Some(3_584),
     },
     Core {
         name: "cortex-m3",
         target: cross::CORTEX_M3,
         machine: "netduino2",
         ticks: 120.0,
+        ceiling: None,
     },
 ];
 
-/// By how much a median may exceed its budget.
-const TOLERANCE: f64 = 1.02;
-/// The column that is measured against, and so has no budget.
-const FLOATING: &str = "inverse_f32";
-/// The fewest poses that are worth a median.
-const LEAST_POSES: usize = 1_000;
+/// The fewest poses that are worth a hash.
+const LEAST_HASHED: u64 = 1_000_000;
 
-/// Instructions of one call over all poses.
-struct Row {
-    name: String,
-    least: f64,
-    median: f64,
-    most: f64,
+/// The hash of what the kernel answers.
+#[derive(PartialEq, Eq)]
+struct Answers {
+    poses: u64,
+    /// How many of them the kernel doesn't refuse.
+    answered: u64,
+    hash: String,
 }
 
-/// What one processor took and answered.
+/// The kernel's bytes of flash.
+struct Flash {
+    /// All that an image with the kernel has more than one without.
+    whole: u64,
+    /// What each function takes of it; the rest is tables and constants.
+    parts: [(&'static str, u64); 3],
+}
+
+/// What was found out about one processor.
 struct Measured {
-    core: &'static str,
-    poses: usize,
-    rows: Vec<Row>,
-    hash: String,
+    core: &'static Core,
+    counts: Counts,
+    answers: Answers,
+    flash: Flash,
 }
 
 /// Measures on both processors, prints, and compares the answers with this machine's.
 ///
 /// # Errors
-/// When the image can't be built or fails, its answers differ from the native ones, or a budget is
-/// exceeded while `check` is set.
+/// When an image can't be built or fails, its answers differ from the native ones, or while `check` is
+/// set a budget, the spread or the ceiling of flash is exceeded, or single precision comes too near.
 pub fn run(json: bool, check: bool) -> Result<()> {
     let Some(emulator) = process::find("qemu-system-arm") else {
         bail!("qemu-system-arm is missing; Debian has it in the package of that name");
     };
-    let native = native_hash()?;
+    let errors = Errors::read(&native("cycles")?)?;
+    let answers = Answers::read(&native("answers")?)?;
     let mut all = Vec::new();
     for core in &CORES {
-        all.push(measure(core, &emulator)?);
+        all.push(Measured::take(core, &emulator)?);
     }
     if json {
-        println!("{:#}", to_json(&all, &native));
+        println!("{:#}", to_json(&all, &answers, &errors));
     } else {
-        all.iter().for_each(print_table);
-        println!("\nhash of the answers on this machine: {native}");
+        all.iter().for_each(Measured::print);
+        println!("\n{errors}");
+        println!("\n{answers}, this machine");
     }
     for measured in &all {
         ensure!(
-            measured.hash == native,
-            "{} answers with other bits than this machine: {} instead of {native}",
-            measured.core,
-            measured.hash
+            measured.answers == answers,
+            "{} answers with other bits than this machine: {} instead of {answers}",
+            measured.core.name,
+            measured.answers
         );
     }
     if check {
-        let complaints = compare(&all, &read_budget()?);
+        let complaints = complaints(&all, &errors)?;
         ensure!(complaints.is_empty(), "{}", complaints.join("; "));
         if !json {
-            println!("every median is within its budget");
+            println!("every median, spread, ratio, error and size is within its bound");
         }
     }
     Ok(())
 }
 
-/// Builds the image for a processor, runs it and reads what it printed.
-fn measure(core: &Core, emulator: &Path) -> Result<Measured> {
-    let mut build = cross::build_command_for(core.target)?;
-    run_command(build.args(["-p", "board-qemu", "--bin", "cycles"]))?;
-    let mut machine = command(emulator);
-    machine
-        .args(["-M", core.machine, "-display", "none", "-monitor", "none"])
-        .args(["-serial", "none", "-icount", "shift=0,sleep=off"])
-        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-        .arg(cross::built_for(core.target, "cycles"));
-    let text = output(&mut machine)?;
-    read(core, &text).with_context(|| format!("what {} printed makes no sense", core.name))
-}
-
-/// Returns the hash of the answers on this machine.
-fn native_hash() -> Result<String> {
-    let mut program = cargo();
-    program.args(["run", "--quiet", "-p", "board-qemu", "--bin", "cycles"]);
-    let text = output(&mut program)?;
-    let hash = text.trim().strip_prefix("hash\t");
-    Ok(hash.context("no hash")?.to_owned())
-}
-
-/// Reads the image's output: repeats, names, ticks of each pose, hash.
-fn read(core: &Core, text: &str) -> Result<Measured> {
-    let (mut repeats, mut names, mut hash) = (0.0, Vec::new(), None);
-    let mut poses: Vec<Vec<f64>> = Vec::new();
-    for line in text.lines() {
-        let mut words = line.split('\t');
-        match words.next() {
-            Some("repeats") => repeats = words.next().unwrap_or_default().parse()?,
-            Some("names") => names = words.collect(),
-            Some("ticks") => poses.push(words.map(str::parse).collect::<Result<_, _>>()?),
-            Some("hash") => hash = words.next(),
-            _ => bail!("unexpected: {line}"),
+/// Returns what exceeds its bound.
+fn complaints(all: &[Measured], errors: &Errors) -> Result<Vec<String>> {
+    let budget = read_budget()?;
+    let mut complaints = errors.complaints();
+    for measured in all {
+        let Measured {
+            core,
+            counts,
+            flash,
+            ..
+        } = measured;
+        complaints.extend(counts.complaints(core.name, &budget[core.name]));
+        if let Some(ceiling) = core.ceiling.filter(|ceiling| flash.whole > *ceiling) {
+            complaints.push(format!(
+                "the kernel takes {} bytes of flash on {}, ceiling {ceiling}",
+                flash.whole, core.name
+            ));
         }
     }
-    ensure!(repeats > 0.0, "it does not say how often it repeats");
-    ensure!(poses.len() >= LEAST_POSES, "only {} poses", poses.len());
-    ensure!(
-        names.len() > 1 && poses.iter().all(|ticks| ticks.len() == names.len()),
-        "names and ticks do not match"
-    );
-    let scale = 1_000.0 / core.ticks / repeats;
-    let rows = names.iter().enumerate().skip(1).map(|(column, name)| {
-        let taken = poses.iter().map(|ticks| (ticks[column] - ticks[0]) * scale);
-        let mut sorted: Vec<f64> = taken.map(f64::round).collect();
-        sorted.sort_by(f64::total_cmp);
-        Row {
-            name: (*name).to_owned(),
-            least: sorted[0],
-            median: sorted[sorted.len() / 2],
-            most: sorted[sorted.len() - 1],
+    Ok(complaints)
+}
+
+/// Runs one of the measuring programs on this machine and returns what it printed.
+fn native(binary: &str) -> Result<String> {
+    output(cargo().args(["run", "--quiet", "-p", "board-qemu", "--bin", binary]))
+}
+
+impl Measured {
+    /// Builds the images for a processor, runs them and reads what they print.
+    fn take(core: &'static Core, emulator: &Path) -> Result<Self> {
+        let mut build = cross::build_command_for(core.target)?;
+        build.args(["-p", "board-qemu"]);
+        for binary in ["cycles", "answers", "kernel", "bare"] {
+            build.args(["--bin", binary]);
         }
-    });
-    Ok(Measured {
-        core: core.name,
-        poses: poses.len(),
-        rows: rows.collect(),
-        hash: hash.context("no hash")?.to_owned(),
-    })
+        run_command(&mut build)?;
+        // Virtual time makes counting possible and QEMU slow: answers do without.
+        let counts = core.run(emulator, "cycles", &["-icount", "shift=0,sleep=off"])?;
+        let answers = core.run(emulator, "answers", &[])?;
+        let nonsense = || format!("what {} printed makes no sense", core.name);
+        Ok(Self {
+            core,
+            counts: Counts::read(core, &counts).with_context(nonsense)?,
+            answers: Answers::read(&answers).with_context(nonsense)?,
+            flash: Flash::measure(core)?,
+        })
+    }
+
+    fn print(&self) {
+        let Self {
+            core,
+            counts,
+            answers,
+            flash,
+        } = self;
+        println!("\ninstructions on {}\n{counts}", core.name);
+        let parts = flash.parts.map(|(name, size)| format!("{name} {size}"));
+        let ceiling = core.ceiling.map_or_else(
+            || "no ceiling".to_owned(),
+            |ceiling| format!("ceiling {ceiling}"),
+        );
+        println!(
+            "flash of the kernel: {} bytes ({}, tables and the rest {}), {ceiling}",
+            flash.whole,
+            parts.join(", "),
+            flash.rest()
+        );
+        println!("{answers}");
+    }
 }
 
-fn print_table(measured: &Measured) {
-    let Measured {
-        core,
-        poses,
-        rows,
-        hash,
-    } = measured;
-    println!("\ninstructions on {core}, {poses} poses");
-    println!("{:<18}{:>8}{:>8}{:>8}", "", "min", "median", "max");
-    for row in rows {
-        let Row {
-            name,
-            least,
-            median,
-            most,
-        } = row;
-        println!("{name:<18}{least:>8}{median:>8}{most:>8}");
+impl Core {
+    /// Runs an image in QEMU and returns what it printed.
+    fn run(&self, emulator: &Path, binary: &str, options: &[&str]) -> Result<String> {
+        let mut machine = command(emulator);
+        machine
+            .args(["-M", self.machine, "-display", "none", "-monitor", "none"])
+            .args(["-serial", "none"])
+            .args(options)
+            .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+            .arg(cross::built_for(self.target, binary));
+        output(&mut machine)
     }
-    let median = |wanted| rows.iter().find(|row| row.name == wanted);
-    if let (Some(ours), Some(floating)) = (median("inverse"), median(FLOATING)) {
-        let ratio = floating.median / ours.median;
-        println!("the inverse in f32 with libm takes {ratio:.1} times as many");
-    }
-    println!("hash of the answers: {hash}");
 }
 
-fn to_json(all: &[Measured], native: &str) -> Value {
-    let cores = all.iter().map(|measured| {
-        let rows = measured.rows.iter().map(|row| {
-            let Row {
-                name,
-                least,
-                median,
-                most,
-            } = row;
-            let numbers = json!({
-                "min": *least as i64, "median": *median as i64, "max": *most as i64,
-            });
-            (name.clone(), numbers)
+impl Answers {
+    /// Reads poses, answered poses and hash.
+    fn read(text: &str) -> Result<Self> {
+        let mut lines = text.lines();
+        let mut value = |name: &str| {
+            let words = lines.next().and_then(|line| line.split_once('\t'));
+            let found = words.filter(|(word, _)| *word == name);
+            found.with_context(|| format!("no {name}"))
+        };
+        let (_, poses) = value("poses")?;
+        let (_, answered) = value("answered")?;
+        let (_, hash) = value("hash")?;
+        let answers = Self {
+            poses: poses.parse()?,
+            answered: answered.parse()?,
+            hash: hash.to_owned(),
+        };
+        ensure!(
+            answers.poses >= LEAST_HASHED && answers.answered >= LEAST_HASHED / 2,
+            "too few: {answers}"
+        );
+        Ok(answers)
+    }
+}
+
+impl std::fmt::Display for Answers {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            poses,
+            answered,
+            hash,
+        } = self;
+        write!(
+            out,
+            "answers to {poses} poses, {answered} not refused: hash {hash}"
+        )
+    }
+}
+
+impl Flash {
+    /// Compares the image with the kernel and the one without it.
+    fn measure(core: &Core) -> Result<Self> {
+        let read = |binary| Image::read(&cross::built_for(core.target, binary));
+        let (kernel, bare) = (read("kernel")?, read("bare")?);
+        let functions = kernel.functions()?;
+        let part = |of: &'static str, mark: &str| {
+            let named = functions.iter().filter(|(name, _)| name.contains(mark));
+            (of, named.map(|(_, size)| size).sum())
+        };
+        let whole = kernel.size()?.flash.checked_sub(bare.size()?.flash);
+        let flash = Self {
+            whole: whole.context("an image with the kernel is smaller than one without")?,
+            parts: [
+                part("inverse", "5image7inverse"),
+                part("direct", "5image6direct"),
+                part("sharing", "5share"),
+            ],
+        };
+        // Sharing's helper bears its file's or its own name.
+        let sum: u64 = flash.parts.iter().map(|(_, size)| size).sum();
+        ensure!(
+            flash.parts.iter().all(|(_, size)| *size > 0) && sum < flash.whole,
+            "the functions of the kernel aren't in its image"
+        );
+        Ok(flash)
+    }
+
+    /// Returns what is no function: tables, constants, and three addresses.
+    fn rest(&self) -> u64 {
+        self.whole - self.parts.iter().map(|(_, size)| size).sum::<u64>()
+    }
+}
+
+fn to_json(all: &[Measured], native: &Answers, errors: &Errors) -> Value {
+    let hashed = |answers: &Answers| {
+        json!({
+            "poses": answers.poses, "answered": answers.answered, "hash": answers.hash,
+        })
+    };
+    let mut value = json!({});
+    for measured in all {
+        let Measured {
+            core,
+            counts,
+            answers,
+            flash,
+        } = measured;
+        let mut bytes = json!({
+            "kernel": flash.whole, "ceiling": core.ceiling, "tables_and_rest": flash.rest(),
         });
-        let value = json!({
-            "poses": measured.poses,
-            "instructions": rows.collect::<Map<_, _>>(),
-            "hash": measured.hash,
-        });
-        (measured.core.to_owned(), value)
-    });
-    let mut value = Value::Object(cores.collect());
-    value["native"] = json!({ "hash": native });
+        for (name, size) in flash.parts {
+            bytes[name] = json!(size);
+        }
+        let mut found = counts.to_json();
+        found["flash"] = bytes;
+        found["answers"] = hashed(answers);
+        value[core.name] = found;
+    }
+    value["native"] = json!({ "answers": hashed(native), "errors": errors.to_json() });
     value
 }
 
@@ -224,70 +312,16 @@ fn read_budget() -> Result<Value> {
     serde_json::from_str(&text).with_context(|| format!("{} is no JSON", path.display()))
 }
 
-/// Returns what exceeds its budget, has none, or is budgeted and not measured.
-fn compare(all: &[Measured], budget: &Value) -> Vec<String> {
-    let mut complaints = Vec::new();
-    for Measured { core, rows, .. } in all {
-        for row in rows.iter().filter(|row| row.name != FLOATING) {
-            let Row { name, median, .. } = row;
-            match budget[*core][name].as_f64() {
-                Some(limit) if *median <= limit * TOLERANCE => {}
-                Some(limit) => complaints.push(format!(
-                    "{name} takes {median} instructions on {core}, budget {limit}"
-                )),
-                None => complaints.push(format!("{name} has no budget on {core}")),
-            }
-        }
-        for name in budget[*core].as_object().into_iter().flat_map(Map::keys) {
-            if !rows.iter().any(|row| row.name == *name) {
-                complaints.push(format!("{name} on {core} has a budget and is not measured"));
-            }
-        }
-    }
-    complaints
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{CORES, compare, read};
-    use serde_json::json;
-
-    /// Two calls of 10 and 84 ticks a repeat beside a loop of 2, with an outlier.
-    fn sample() -> String {
-        let mut text = "repeats\t1\nnames\tloop\troot\tinverse_f32".to_owned();
-        for pose in 0..1_001 {
-            let root = if pose == 7 { 422 } else { 170 };
-            text.push_str(&format!("\nticks\t2\t{root}\t338"));
-        }
-        text + "\nhash\tabc"
-    }
+    use super::Answers;
 
     #[test]
-    fn subtracts_the_loop_and_keeps_the_extremes() {
-        let measured = read(&CORES[0], &sample()).expect("well formed");
-        let [root, floating] = measured.rows.as_slice() else {
-            panic!("two rows");
-        };
-        assert_eq!((root.least, root.median, root.most), (1e3, 1e3, 2.5e3));
-        assert_eq!(floating.median, 2e3);
-        assert_eq!(measured.hash, "abc");
-    }
-
-    #[test]
-    fn complains_two_percent_above_a_budget_and_not_before() {
-        let measured = [read(&CORES[0], &sample()).expect("well formed")];
-        let complaints = |budget| compare(&measured, &json!({ "cortex-m4": budget })).len();
-        assert_eq!(complaints(json!({ "root": 1_000 })), 0);
-        assert_eq!(complaints(json!({ "root": 981 })), 0);
-        assert_eq!(complaints(json!({ "root": 980 })), 1);
-        assert_eq!(complaints(json!({})), 1);
-        assert_eq!(complaints(json!({ "root": 1_000, "gone": 5 })), 1);
-    }
-
-    #[test]
-    fn refuses_an_output_that_was_cut() {
-        assert!(read(&CORES[0], "repeats\t32\nnames\tloop\troot").is_err());
-        assert!(read(&CORES[0], sample().trim_end_matches("\nhash\tabc")).is_err());
-        assert!(read(&CORES[0], "failed\tRefused").is_err());
+    fn refuses_answers_that_are_cut_or_mostly_refusals() {
+        let text = |answered| format!("poses\t1000000\nanswered\t{answered}\nhash\tabc\n");
+        assert!(Answers::read(&text(800_000)).is_ok());
+        assert!(Answers::read(&text(400_000)).is_err());
+        assert!(Answers::read("poses\t1000000\nanswered\t800000").is_err());
+        assert!(Answers::read("poses\t1000\nanswered\t800\nhash\tabc").is_err());
     }
 }

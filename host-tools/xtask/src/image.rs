@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
-use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind};
+use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
 /// Flash of both boards: 512 KB here, where the STM32F405 in QEMU has 1 MB.
 pub const FLASH: Range<u64> = 0x0800_0000..0x0808_0000;
@@ -91,6 +91,20 @@ impl Image {
         Ok(file
             .symbols()
             .filter_map(|symbol| symbol.name().ok().map(str::to_owned))
+            .collect())
+    }
+
+    /// Returns the mangled names of all functions with the bytes that each takes.
+    ///
+    /// # Errors
+    /// When the ELF file is malformed.
+    pub fn functions(&self) -> Result<Vec<(String, u64)>> {
+        let file = object::File::parse(self.bytes.as_slice())?;
+        let functions = file
+            .symbols()
+            .filter(|symbol| symbol.kind() == SymbolKind::Text);
+        Ok(functions
+            .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.size())))
             .collect())
     }
 

@@ -3,8 +3,11 @@
 //! Knows the tools around the project (cross toolchain, QEMU, User-mode Linux, Python) and nothing
 //! of its crates but their names.
 
+mod counts;
 mod cross;
 mod cycles;
+mod errors;
+mod exhaustive;
 mod firmware;
 mod generated;
 mod image;
@@ -32,7 +35,8 @@ struct Arguments {
 enum Task {
     /// Runs everything that the project can test, and prints what each step took.
     Test {
-        /// Leaves out what needs a tool beyond cargo: firmware, QEMU, vcan and Python.
+        /// Leaves out what needs a tool beyond cargo (firmware, QEMU, vcan and Python), and the primitives'
+        /// every input.
         #[arg(long)]
         fast: bool,
         /// Stops at the first step that fails.
@@ -67,12 +71,16 @@ enum Task {
     Size,
     /// Fails when a panicking symbol is reachable from the logic crates on the target.
     Panics,
-    /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU.
+    /// Checks every single input of the fixed-point primitives, on all processors of this machine.
+    Exhaustive,
+    /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU, beside f32 with
+    /// libm; weighs its flash, compares its errors, and hashes its answers on all machines.
     Cycles {
         /// Prints JSON.
         #[arg(long)]
         json: bool,
-        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %.
+        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %, or when spread,
+        /// flash, or the distance to f32 miss their bound.
         #[arg(long)]
         check: bool,
     },
@@ -91,6 +99,7 @@ fn main() -> ExitCode {
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
+        Task::Exhaustive => exhaustive::check(),
         Task::Cycles { json, check } => cycles::run(json, check),
     };
     match done {

@@ -7,69 +7,74 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, firmware, generated, panics, setup, vcan};
+use crate::{cycles, exhaustive, firmware, generated, panics, setup, vcan};
 
-/// One step: its name, and whether it needs a tool beyond cargo.
+/// One step: its name, and whether a fast run has it.
 struct Step {
     name: &'static str,
-    needs_tools: bool,
+    in_fast: bool,
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 11] = [
+const STEPS: [Step; 12] = [
     Step {
         name: "tools",
-        needs_tools: true,
+        in_fast: false,
         run: setup::prepare,
     },
     Step {
         name: "format",
-        needs_tools: false,
+        in_fast: true,
         run: check_format,
     },
     Step {
         name: "lints",
-        needs_tools: false,
+        in_fast: true,
         run: check_lints,
     },
     Step {
         name: "firmware images",
-        needs_tools: true,
+        in_fast: false,
         run: || firmware::build(None),
     },
     Step {
         name: "no panic in logic",
-        needs_tools: true,
+        in_fast: false,
         run: panics::check,
     },
     Step {
-        name: "instruction budgets",
-        needs_tools: true,
+        name: "the kernel's budgets",
+        in_fast: false,
         run: || cycles::run(false, true),
     },
     Step {
         name: "tests",
-        needs_tools: false,
+        in_fast: true,
         run: run_tests,
     },
     Step {
+        name: "every input of primitives",
+        in_fast: false,
+        run: exhaustive::check,
+    },
+    Step {
         name: "tests on vcan0",
-        needs_tools: true,
+        in_fast: false,
         run: run_vcan_tests,
     },
     Step {
         name: "generated files",
-        needs_tools: false,
+        in_fast: true,
         run: || generated::run_generator(true),
     },
     Step {
         name: "the main job",
-        needs_tools: false,
+        in_fast: true,
         run: run_main_job,
     },
     Step {
         name: "debug and release agree",
-        needs_tools: false,
+        in_fast: true,
         run: compare_profiles,
     },
 ];
@@ -80,7 +85,7 @@ const STEPS: [Step; 11] = [
 /// When a step failed.
 pub fn run_all(fast: bool, stop: bool) -> Result<()> {
     let mut results: Vec<(&str, Result<()>, Duration)> = Vec::new();
-    for step in STEPS.iter().filter(|step| !(fast && step.needs_tools)) {
+    for step in STEPS.iter().filter(|step| !fast || step.in_fast) {
         println!("\n=== {} ===", step.name);
         let start = Instant::now();
         let result = (step.run)();
@@ -93,13 +98,13 @@ pub fn run_all(fast: bool, stop: bool) -> Result<()> {
             break;
         }
     }
-    println!("\n{:<24} {:>8}  result", "step", "seconds");
+    println!("\n{:<26} {:>8}  result", "step", "seconds");
     for (name, result, time) in &results {
         let word = if result.is_ok() { "ok" } else { "FAILED" };
-        println!("{name:<24} {:>8.1}  {word}", time.as_secs_f64());
+        println!("{name:<26} {:>8.1}  {word}", time.as_secs_f64());
     }
     let total: Duration = results.iter().map(|(_, _, time)| *time).sum();
-    println!("{:<24} {:>8.1}", "all", total.as_secs_f64());
+    println!("{:<26} {:>8.1}", "all", total.as_secs_f64());
     let failed: Vec<_> = results
         .iter()
         .filter(|(_, result, _)| result.is_err())
