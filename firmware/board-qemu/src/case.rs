@@ -1,7 +1,7 @@
 //! A pose of the workspace with everything that the measured calls take, and the check of their answers.
 
 use eel_kinematics::{Bounds, Direct, Inverse, Policy, Pose, Wrist};
-use eel_units::Torque;
+use eel_units::{Angle, Torque};
 
 use crate::floating::{self, Vector};
 use crate::numbers::{Numbers, float};
@@ -37,6 +37,8 @@ pub struct Case {
     /// One that doesn't.
     pub overload: [Torque; 3],
     pub bounds: [Bounds; 3],
+    /// A target twice as far in yaw, three times in pitch and roll: many are out of reach.
+    pub beyond: Pose,
     pub floats: Floats,
 }
 
@@ -77,6 +79,11 @@ impl Case {
             low: Torque::from_millinewton_metres(-3_000),
             high: Torque::from_millinewton_metres(3_000),
         }; 3];
+        let beyond = Pose {
+            yaw: Angle::from_q29(yaw.to_q29() * 2),
+            pitch: Angle::from_q29(pitch.to_q29() * 3),
+            roll: Angle::from_q29(roll.to_q29() * 3),
+        };
         let case = Self {
             floats: Floats {
                 pose: [yaw, pitch, roll].map(|angle| float::<29>(angle.to_q29())),
@@ -102,6 +109,7 @@ impl Case {
             moment,
             overload,
             bounds,
+            beyond,
         };
         case.check_bounds()?;
         case.check_floats()?;

@@ -4,7 +4,7 @@ use core::fmt::Write;
 use core::hint::black_box;
 
 use cortex_m_semihosting::{debug, hio};
-use eel_kinematics::{Direct, Inverse, Policy, Shared, Wrist};
+use eel_kinematics::{Direct, Inverse, Policy, Reach, Shared, Wrist};
 use eel_units::{Torque, arctangents, ratio_q30, root_near, sin_cos_near};
 use libm::{atanf, sqrtf};
 
@@ -21,7 +21,7 @@ const SEED: u64 = 0x0EE1_0000_0003;
 /// How often each call is repeated: a tick is six instructions.
 const REPEATS: u32 = 32;
 /// What the names of the columns are; the first is the loop alone.
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 14] = [
     "loop",
     "sine_cosine",
     "arctangent",
@@ -35,6 +35,7 @@ const NAMES: [&str; 13] = [
     "share_keeping_direction",
     "step_free",
     "step_saturated",
+    "nearest",
 ];
 /// What the names of the columns in single precision are.
 const FLOAT_NAMES: [&str; 9] = [
@@ -130,8 +131,14 @@ fn measure(stopwatch: &Stopwatch, case: &Case) -> [u32; NAMES.len()] {
         }),
         repeat(stopwatch, || step(case, &case.moment)),
         repeat(stopwatch, || step(case, &case.overload)),
+        repeat(stopwatch, || {
+            black_box(wrist).nearest(black_box(&case.beyond), black_box(&NEAREST))
+        }),
     ]
 }
+
+/// Where the nearest pose is looked for: all that the kernel reaches.
+const NEAREST: Reach = Reach::kernel();
 
 /// A step: inverse, direct with Jacobian, sharing.
 #[inline(always)]

@@ -136,8 +136,8 @@ impl Jacobian {
             .torque_rows()
             .map(|row| (dot(&row, moment) >> 30) as i32);
         let (mut fraction, mut tightest) = (WHOLE, 0);
-        for index in 0..3 {
-            let feasible = motors.feasible(index, parts[index]);
+        for (index, &wanted) in parts.iter().enumerate() {
+            let feasible = motors.feasible(index, wanted);
             if feasible < fraction {
                 (fraction, tightest) = (feasible, index);
             }

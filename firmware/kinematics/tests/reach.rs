@@ -80,17 +80,21 @@ fn some_reach(random: &mut Random) -> Reach {
 #[test]
 fn comes_as_near_as_a_search_does() {
     let mut random = Random::new(0x4EAC_4000_0000_0001);
-    let (mut cases, mut worst, mut ratio) = (0, 0.0f64, 0.0f64);
+    let (mut cases, mut worst) = (0, [0.0f64; 3]);
     let mut obstacles = [0; 3];
-    while cases < 400 || obstacles.iter().any(|&count| count < 20) {
-        let geometry = if cases % 2 == 0 {
+    while cases < 1_500 || obstacles.iter().any(|&count| count < 20) {
+        let geometry = if cases % 3 == 0 {
             Geometry::PARALLEL_ACTUATORS
         } else {
             common::within_tolerance(&mut random)
         };
         let wrist = geometry.kernel().unwrap();
         let reach = some_reach(&mut random);
-        let size = if cases < 200 {
+        // The kernel's range, farther away, and the box that is allowed.
+        let is_far = cases % 5 == 0;
+        let size = if is_far {
+            [2.0, 2.0, 2.0]
+        } else if cases < 700 {
             [0.9, 0.55, 0.3]
         } else {
             angles(&reach.range)
@@ -117,15 +121,20 @@ fn comes_as_near_as_a_search_does() {
         let wanted = angles(&target);
         let found = distance(&angles(&pose), &wanted);
         let least = search(&wrist, &reach, &wanted, &mut random);
-        worst = worst.max(found - least);
-        ratio = ratio.max(found / least.max(0.01));
+        // A box about the paper's, all that the kernel reaches, a target far beyond that.
+        let (kind, allowance) = match (is_far, reach.range == Reach::kernel().range) {
+            (true, _) => (2, 1.2),
+            (false, true) => (1, 1.1),
+            (false, false) => (0, 1.01),
+        };
         assert!(
-            found <= least * 1.02 + 1e-3,
+            found <= least * allowance + 1e-3,
             "{target:?}: {found} instead of {least}, {obstacle:?}, {reach:?}"
         );
+        worst[kind] = worst[kind].max((found - 1e-3) / least);
     }
     println!(
-        "{cases} targets, at most {worst:.2e} rad or {ratio:.4} times farther than the search; {obstacles:?}"
+        "{cases} targets, times as far as the search, less 1 mrad: {worst:.4?}; {obstacles:?}"
     );
 }
 

@@ -181,6 +181,8 @@ fn braking_step(distance: Angle, period: Duration) -> Angle {
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::float_arithmetic, reason = "tests only")]
+
     use super::*;
     use crate::settings::Settings;
     use eel_protocol::NodeId;
@@ -237,12 +239,9 @@ mod tests {
     /// A box of which the legs do not reach the corners.
     fn wide_settings(scale: f64) -> Settings {
         let mut settings = settings();
-        let milliradians = |angle: f64| Angle::from_milliradians((angle * scale * 1e3) as i32);
-        settings.limits.workspace = Pose {
-            yaw: milliradians(0.5236),
-            pitch: milliradians(0.2618),
-            roll: milliradians(0.0698),
-        };
+        let range = axes(&settings.limits.workspace);
+        let wider = range.map(|end| Angle::from_q29((f64::from(end.to_q29()) * scale) as i32));
+        settings.limits.workspace = pose(wider);
         settings
     }
 

@@ -218,7 +218,7 @@ fn what_no_leg_reaches_is_refused_with_the_nearest_pose() {
     let (_, tail) = err
         .split_once("yaw, pitch, roll = ")
         .expect("the nearest pose");
-    let (angles, _) = tail.split_once(" (").expect("the workspace after it");
+    let (angles, _) = tail.split_once(" deg (").expect("the workspace after it");
     let angles: Vec<&str> = angles.split(", ").collect();
     let again = json(&[
         "ik",

@@ -14,7 +14,7 @@ Assembly modes name the direct ones: home (det A > 0), other-psi (det A < 0), an
 other-phi (det A > 0) and other-both (det A < 0). The home branch is ++ and home, with cos phi > 0.
 
 Exit codes: 0 answered; 1 a claim that should hold does not (paper); 2 wrong usage, or no
-configuration answers.
+configuration answers; 3 a file can't be written.
 
 Examples:
   eel wrist ik --yaw 20 --pitch 5 --degrees          motor angles, fixed point beside double precision

@@ -99,10 +99,9 @@ pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
     let geometry = fk.common.subject.architecture.geometry();
     let all = platforms(&geometry, &theta);
     let mode = fk.assembly_mode;
-    // In home's branch cos φ must be positive too.
-    let exists = mode != AssemblyMode::HOME || geometry.direct(&theta).is_some();
+    let exists = is_joined(&geometry, mode, &theta);
     let Some((_, asked_for)) = all.iter().find(|(name, _)| exists && *name == mode.name()) else {
-        return Err(no_platform(mode, &all));
+        return Err(no_platform(mode, all.iter().map(|(name, _)| *name)));
     };
     let other = (mode != AssemblyMode::HOME).then(|| mode.name());
     let choice = fixed::choose(&fk.common, other, || fixed::direct(&theta))?;
@@ -144,10 +143,17 @@ pub fn run(out: &mut dyn Write, fk: &Fk) -> Result<()> {
     Ok(writeln!(out)?)
 }
 
+/// Tells whether an assembly mode may be asked for: in home's branch cos φ must be positive too.
+pub fn is_joined(geometry: &Geometry, mode: AssemblyMode, theta: &[f64; 3]) -> bool {
+    mode != AssemblyMode::HOME || geometry.direct(theta).is_some()
+}
+
 /// Says that the motors' angles can't be joined in a mode, and in which they can.
-fn no_platform(mode: AssemblyMode, all: &[(&'static str, Platform)]) -> anyhow::Error {
-    let others: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
-    let others: Vec<&str> = others
+pub fn no_platform<'a>(
+    mode: AssemblyMode,
+    found: impl IntoIterator<Item = &'a str>,
+) -> anyhow::Error {
+    let others: Vec<&str> = found
         .into_iter()
         .filter(|name| *name != mode.name())
         .collect();

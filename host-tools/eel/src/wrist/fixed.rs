@@ -98,8 +98,7 @@ pub struct Nearest {
 /// Returns the pose nearest to (yaw, pitch, roll) in rad that the kernel reaches; nothing where it
 /// reaches that.
 pub fn nearest(pose: [f64; 3]) -> Option<Nearest> {
-    let held = pose.map(|angle| angle.clamp(-MOST_RADIANS, MOST_RADIANS));
-    let found = Wrist::PAPER.nearest(&pose_of(held).ok()?, &Reach::kernel());
+    let found = Wrist::PAPER.nearest(&pose_of(pose).ok()?, &Reach::kernel());
     let found = found.ok()?;
     Some(Nearest {
         pose: [found.pose.yaw, found.pose.pitch, found.pose.roll].map(radians),
@@ -116,7 +115,7 @@ pub fn nearest(pose: [f64; 3]) -> Option<Nearest> {
 pub fn direct(theta: &[f64; 3]) -> Result<Direct, &'static str> {
     let [a, b, c] = *theta;
     let joints = Joints([angle(a)?, angle(b)?, angle(c)?]);
-    Wrist::PAPER.direct(&joints).map_err(reason)
+    Wrist::PAPER.direct(&joints).map_err(direct_reason)
 }
 
 /// Returns what the kernel knows at (yaw, pitch, roll) in rad: its inverse, then its direct.
@@ -164,13 +163,24 @@ pub fn radians(angle: Angle) -> f64 {
     f64::from(angle.to_q29()) / Q29
 }
 
-/// Returns the pose nearest to (yaw, pitch, roll) in rad.
-fn pose_of([yaw, pitch, roll]: [f64; 3]) -> Result<Pose, &'static str> {
+/// Returns the pose nearest to (yaw, pitch, roll) in rad, each within half a turn.
+fn pose_of(angles: [f64; 3]) -> Result<Pose, &'static str> {
+    let [yaw, pitch, roll] = angles.map(wrapped);
     Ok(Pose {
         yaw: angle(yaw)?,
         pitch: angle(pitch)?,
         roll: angle(roll)?,
     })
+}
+
+/// Returns the same angle within ±π.
+fn wrapped(radians: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    if radians.abs() <= PI {
+        radians
+    } else {
+        (radians + PI).rem_euclid(TAU) - PI
+    }
 }
 
 fn angle(radians: f64) -> Result<Angle, &'static str> {
@@ -183,7 +193,18 @@ fn angle(radians: f64) -> Result<Angle, &'static str> {
 const fn reason(error: PoseError) -> &'static str {
     match error {
         PoseError::OutOfReach => {
-            "out of reach, or beyond its range (yaw ±1 rad, pitch and roll ±0.5 rad, cranks ±0.97 rad)"
+            "out of reach, or beyond its range (yaw ±1 rad, pitch and roll ±0.5 rad; cranks ±0.97 rad, motor 3 \
+             ±0.49 rad from home)"
+        }
+        PoseError::Singular => "too near a singularity",
+    }
+}
+
+/// Says why the direct kinematics refuses, whose range is a little wider.
+const fn direct_reason(error: PoseError) -> &'static str {
+    match error {
+        PoseError::OutOfReach => {
+            "the parts can't be joined, or a motor is beyond its range (cranks ±1 rad, motor 3 ±0.5 rad from home)"
         }
         PoseError::Singular => "too near a singularity",
     }

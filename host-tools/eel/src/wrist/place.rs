@@ -60,7 +60,11 @@ impl Place {
                 Architecture::ParallelActuators => fixed::nearest(pose),
                 _ => None,
             };
-            let nearest = nearest.map(|nearest| unit.columns(&nearest.pose));
+            let nearest = nearest.map(|nearest| {
+                let columns = unit.columns(&nearest.pose);
+                let words: Vec<&str> = columns.split_whitespace().collect();
+                format!("{} {}", words.join(", "), unit.name)
+            });
             return Err(out_of_reach(&geometry, pose, &rotation, nearest.as_deref()));
         };
         if rotation[(0, 0)].hypot(rotation[(1, 0)]) < LEAST_COS_PHI {
@@ -177,12 +181,8 @@ fn out_of_reach(
         .take_while(|step| is_reached(f64::from(*step) / f64::from(steps)))
         .last()
         .unwrap_or(0);
-    let nearest = nearest.map_or_else(String::new, |columns| {
-        let words: Vec<&str> = columns.split_whitespace().collect();
-        format!(
-            "; the nearest pose that the firmware reaches is yaw, pitch, roll = {}",
-            words.join(", ")
-        )
+    let nearest = nearest.map_or_else(String::new, |angles| {
+        format!("; the nearest pose that the firmware reaches is yaw, pitch, roll = {angles}")
     });
     refused(format!(
         "out of reach: leg {} can't get there; yaw, pitch and roll scaled by {:.3} are still in reach{nearest} \

@@ -14,7 +14,7 @@ use eel_kinematics::design::{self, AssemblyMode, Geometry, Matrix3, WorkingMode}
 use serde::Serialize;
 
 use super::args::{Architecture, Draw, Figure};
-use super::direct::phi_psi;
+use super::direct::{is_joined, no_platform, phi_psi};
 use super::number::{Unit, signed};
 use super::place::Place;
 use super::{check_out, deliver, refused};
@@ -151,18 +151,16 @@ fn at_theta(asked: &Draw, theta: &[f64], unit: Unit) -> Result<Drawing> {
             configurations: all,
         });
     }
-    let names: Vec<String> = all.iter().map(|one| one.mode.clone()).collect();
-    let wanted = asked.assembly_mode.name();
-    let Some(one) = all.into_iter().find(|one| one.mode == wanted) else {
-        return Err(refused(format!(
-            "no platform joins these motor angles in assembly mode {wanted}; say --assembly-mode {}",
-            names.join(" or ")
-        )));
+    let mode = asked.assembly_mode;
+    let exists = is_joined(&architecture.geometry(), mode, &theta);
+    let Some(one) = all.iter().position(|one| exists && one.mode == mode.name()) else {
+        return Err(no_platform(mode, all.iter().map(|one| one.mode.as_str())));
     };
+    let one = all.into_iter().nth(one).into_iter().collect();
     Ok(Drawing {
         title: title(architecture, ""),
         subtitle,
-        configurations: vec![one],
+        configurations: one,
     })
 }
 
