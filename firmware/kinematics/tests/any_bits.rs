@@ -174,20 +174,19 @@ fn maps_and_sharing_survive_every_input() {
             low: Torque::from_q24(bits(&mut random)),
             high: Torque::from_q24(bits(&mut random)),
         });
-        let shared = jacobian.share(&moment, &bounds, Policy::YawFirst);
-        for (torque, bound) in shared.torque.iter().zip(&bounds) {
-            assert!(
-                *torque >= bound.low.min(Torque::ZERO),
-                "{shared:?} {bounds:?}"
-            );
-            assert!(
-                *torque <= bound.high.max(Torque::ZERO),
-                "{shared:?} {bounds:?}"
-            );
-        }
-        for (achieved, asked) in shared.achieved.iter().zip(&moment) {
-            let (achieved, asked) = (i64::from(achieved.to_q24()), i64::from(asked.to_q24()));
-            assert!(achieved * asked.signum() >= 0 && achieved.abs() <= asked.abs());
+        for policy in [Policy::YawFirst, Policy::KeepDirection] {
+            let shared = jacobian.share(&moment, &bounds, policy);
+            for (torque, bound) in shared.torque.iter().zip(&bounds) {
+                assert!(
+                    *torque >= bound.low.min(Torque::ZERO)
+                        && *torque <= bound.high.max(Torque::ZERO),
+                    "{shared:?} {bounds:?}"
+                );
+            }
+            for (achieved, asked) in shared.achieved.iter().zip(&moment) {
+                let (achieved, asked) = (i64::from(achieved.to_q24()), i64::from(asked.to_q24()));
+                assert!(achieved * asked.signum() >= 0 && achieved.abs() <= asked.abs());
+            }
         }
     }
 }

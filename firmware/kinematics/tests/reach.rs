@@ -185,7 +185,13 @@ fn every_input_is_survived() {
         _ => Angle::from_q29(random.bits() >> (random.next() % 6)),
     };
     let mut answers = 0;
-    for _ in 0..20_000 {
+    let mut units = Random::new(0x4EAC_4000_0000_0004);
+    let mut wrist = Wrist::PAPER;
+    for round in 0..20_000 {
+        if round % 50 == 49 {
+            let geometry = common::within_tolerance(&mut units);
+            wrist = geometry.kernel().unwrap();
+        }
         let [yaw, pitch, roll] = [angle(), angle(), angle()];
         let target = Pose { yaw, pitch, roll };
         let [yaw, pitch, roll] = [angle(), angle(), angle()];
@@ -193,9 +199,14 @@ fn every_input_is_survived() {
             range: Pose { yaw, pitch, roll },
             margin: angle().to_q29(),
         };
-        if let Ok(nearest) = Wrist::PAPER.nearest(&target, &reach) {
+        if let Ok(nearest) = wrist.nearest(&target, &reach) {
             answers += 1;
-            assert!(Wrist::PAPER.inverse(&nearest.pose).is_ok());
+            assert!(wrist.inverse(&nearest.pose) == Ok(nearest.inverse));
+            assert!(nearest.inverse.margin() >= reach.margin);
+            let inside = |angle: Angle, range: Angle| angle.abs() <= range.max(Angle::ZERO);
+            let (pose, range) = (&nearest.pose, &reach.range);
+            assert!(inside(pose.yaw, range.yaw) && inside(pose.pitch, range.pitch));
+            assert!(inside(pose.roll, range.roll));
         }
     }
     assert!(answers > 1_000, "{answers}");

@@ -87,6 +87,8 @@ fn worst_ratio(step: usize) -> [f64; 2] {
             divisor / 2,
             divisor / 3,
             (divisor >> 7).wrapping_mul(37) % divisor,
+            // Where the digits err most: what the leading bits divide.
+            (divisor >> 15) << 15,
         ] {
             let number = if divisor & 2 == 0 { number } else { -number };
             let error = f64::from(ratio_q30(number, divisor)) / Q30

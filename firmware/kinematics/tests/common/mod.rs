@@ -65,16 +65,24 @@ impl Random {
     }
 }
 
-/// A unit whose every length and zero is off by up to 1.99 %.
+/// A unit whose every length and zero is off by up to 2 %, half of them by all of it.
 pub fn within_tolerance(random: &mut Random) -> Geometry {
     let mut geometry = Geometry::PARALLEL_ACTUATORS;
+    let mut part = || {
+        let part = random.sign();
+        0.02 * if random.next().is_multiple_of(2) {
+            part.signum()
+        } else {
+            part
+        }
+    };
     for leg in &mut geometry.legs {
         for k in 0..3 {
-            leg.center[k] += 0.0199 * random.sign();
+            leg.center[k] += part();
         }
-        leg.crank *= 1.0 + 0.0199 * random.sign();
-        leg.rod *= 1.0 + 0.0199 * random.sign();
-        let zero = 0.0199 * random.sign();
+        leg.crank *= 1.0 + part();
+        leg.rod *= 1.0 + part();
+        let zero = part();
         leg.zero = Vector3::new(0.0, zero.cos(), zero.sin());
     }
     geometry
