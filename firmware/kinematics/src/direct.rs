@@ -12,9 +12,9 @@ use crate::vector::{Vector, dot, high, times_root_two, wide};
 use crate::wrist::{Push, Wrist};
 
 /// The least assembly margin of a leg, W = ¾ where home has √2: its square in Q26.
-const LEAST_ASSEMBLY_SQUARE: i32 = 9 << 22;
+pub(crate) const LEAST_ASSEMBLY_SQUARE: i32 = 9 << 22;
 /// The least serial margin: ⅛ in Q30.
-const LEAST_SERIAL: i32 = 1 << 27;
+pub(crate) const LEAST_SERIAL: i32 = 1 << 27;
 
 /// What the direct kinematics gives for three motor angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

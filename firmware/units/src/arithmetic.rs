@@ -45,6 +45,13 @@ pub fn ratio_q30(number: i32, divisor: i32) -> i32 {
     (first << 15).wrapping_add(divide(rest, leading))
 }
 
+/// Where the line starts that is within 12 % of the root; one instruction makes it, as the slope.
+#[doc(hidden)]
+pub const ROOT_START_Q15: i32 = 5_214;
+/// The line's slope.
+#[doc(hidden)]
+pub const ROOT_SLOPE_Q16: i32 = 0x9C << 9;
+
 /// Returns the square root in Q30 of a Q31 number in 1/32..0.55, wrong by at most 2e-9; from ⅛ on by
 /// at most 1.2e-9.
 ///
@@ -53,10 +60,7 @@ pub fn ratio_q30(number: i32, divisor: i32) -> i32 {
 /// A straight line, two steps of Heron with a UDIV each, then the exact residual.
 #[inline(always)]
 pub fn root_near(square: i32) -> i32 {
-    // The line is wrong by 12 % at most. One instruction makes each of its constants.
-    const START_Q15: i32 = 5_214;
-    const SLOPE_Q16: i32 = 0x9C << 9;
-    let rough = multiply_high_add(START_Q15, square, SLOPE_Q16) as u32;
+    let rough = multiply_high_add(ROOT_START_Q15, square, ROOT_SLOPE_Q16) as u32;
     // The sum of the two sides of Heron is twice the root, in Q16: to 0.8 %.
     let twice = (rough << 1).wrapping_add(divide_unsigned(square as u32, rough));
     let doubled = (square as u32) << 1; // Q32

@@ -10,6 +10,7 @@ mod generated;
 mod image;
 mod panics;
 mod process;
+mod proofs;
 mod setup;
 mod suite;
 mod vcan;
@@ -67,6 +68,10 @@ enum Task {
     Size,
     /// Fails when a panicking symbol is reachable from the logic crates on the target.
     Panics,
+    /// Proves with Gappa that the wrist's kernel never overflows, and how wrong it can be.
+    ///
+    /// The scripts stay in target/proofs.
+    Proofs,
     /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU.
     Cycles {
         /// Prints JSON.
@@ -91,6 +96,7 @@ fn main() -> ExitCode {
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
+        Task::Proofs => proofs::run(),
         Task::Cycles { json, check } => cycles::run(json, check),
     };
     match done {

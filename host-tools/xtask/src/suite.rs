@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, firmware, generated, panics, setup, vcan};
+use crate::{cycles, firmware, generated, panics, proofs, setup, vcan};
 
 /// One step: its name, and whether it needs a tool beyond cargo.
 struct Step {
@@ -16,7 +16,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 11] = [
+const STEPS: [Step; 12] = [
     Step {
         name: "tools",
         needs_tools: true,
@@ -46,6 +46,11 @@ const STEPS: [Step; 11] = [
         name: "instruction budgets",
         needs_tools: true,
         run: || cycles::run(false, true),
+    },
+    Step {
+        name: "proofs",
+        needs_tools: true,
+        run: proofs::run,
     },
     Step {
         name: "tests",

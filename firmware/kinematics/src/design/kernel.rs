@@ -9,7 +9,7 @@ use super::{Geometry, Leg};
 use crate::wrist::{self, Pull, Push};
 
 /// How far each length and zero may be from the paper's: 2 % of the platform's arm (or of itself).
-const TOLERANCE: f64 = 0.02;
+pub(crate) const TOLERANCE: f64 = 0.02;
 
 impl Geometry {
     /// Returns the kernel of a unit with parallel actuators, of whatever scale.

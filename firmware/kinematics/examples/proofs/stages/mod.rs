@@ -1,0 +1,13 @@
+//! The stages of the kernel, each as a trace and as the scripts that prove it.
+
+pub mod inverse;
+pub mod primitives;
+
+use crate::script::Script;
+
+/// Returns all scripts.
+pub fn scripts() -> Vec<Script> {
+    let mut scripts = primitives::scripts();
+    scripts.extend(inverse::scripts());
+    scripts
+}
