@@ -31,6 +31,7 @@ mod minimax;
 #[allow(dead_code, reason = "a part of it is used here")]
 mod pose;
 #[path = "../../src/rotation.rs"]
+#[allow(clippy::wrong_self_convention, reason = "the crate exports it so")]
 #[allow(dead_code, reason = "a part of it is used here")]
 mod rotation;
 mod script;

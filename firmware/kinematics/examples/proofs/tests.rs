@@ -4,8 +4,8 @@ use eel_units::{Angle, arctangents, ratio_q30, root_near, sin_cos_near};
 
 use crate::design::{self, Geometry};
 use crate::inverse::Inverse;
-use crate::pose::Pose;
-use crate::stages::{inverse, primitives};
+use crate::pose::{Joints, Pose};
+use crate::stages::{direct, inverse, primitives};
 use crate::trace::{Trace, Value};
 use crate::vector::times_root_two;
 use crate::wrist::Wrist;
@@ -54,6 +54,13 @@ impl Random {
             leg.zero = design::Vector3::new(0.0, cosine, sine);
         }
         geometry
+    }
+
+    /// Joints within the kernel's range.
+    pub fn joints(&mut self) -> Joints {
+        let mut angle = |most: f64| (self.sign() * most * f64::from(1 << 29)) as i32;
+        let quarter = Angle::FRAC_PI_4.to_q29();
+        Joints([angle(0.97), angle(0.97), quarter + angle(0.4999)].map(Angle::from_q29))
     }
 
     /// A pose within the kernel's range, more often near home.
@@ -208,6 +215,128 @@ fn without_rounding_the_inverse_is_the_models() {
         }
     }
     assert!(answers > 10_000, "only {answers} answers");
+}
+
+/// What the direct kinematics answers with, as numbers of a trace.
+struct Answer {
+    columns: [[Value; 3]; 3],
+    rows: [[Value; 3]; 3],
+    determinant: Value,
+    serial: [Value; 2],
+}
+
+/// The whole direct kinematics, from the joints' angles and the constants.
+fn whole_direct() -> (Trace, Answer) {
+    let t = &mut Trace::default();
+    let joints = t.inputs(["theta1", "theta2", "theta3"], 29);
+    let zeros = t.inputs(["zero1", "zero2"], 29);
+    let pushes = [direct::push(t), direct::push(t)];
+    let cranks = t.input("cranks", 31);
+    let quarter = t.constant("quarter", Angle::FRAC_PI_4.to_q29().into(), 29);
+    let angles = [
+        t.add("", joints[0], zeros[0]),
+        t.add("", joints[1], zeros[1]),
+        t.subtract("", joints[2], quarter),
+    ];
+    let [turn1, turn2, turn3] = angles.map(|angle| t.sine_cosine("", angle));
+    let [c3, s3] = direct::third(t, turn3);
+    let crank1 = direct::turned(t, &pushes[0], turn1);
+    let [k, m, across] = direct::first_equation(t, c3, s3, &crank1);
+    let phi = direct::find(t, 1, [k, m, crank1.offset]);
+    let turn = direct::sine_cosine(t, phi.tangent);
+    let [x, z] = direct::first_axes(t, c3, s3, turn);
+    let serial1 = direct::serial(t, &pushes[0], &crank1, x);
+    let first = direct::first(t, phi.margin, serial1, across);
+    let crank2 = direct::turned(t, &pushes[1], turn2);
+    let [k, m, along] = direct::second_equation(t, [c3, s3], &crank2, [x, z]);
+    let psi = direct::find(t, -1, [k, m, crank2.offset]);
+    let turn = direct::sine_cosine(t, psi.tangent);
+    let [point, axis] = direct::second_axes(t, [c3, s3], z, turn);
+    let serial2 = direct::serial(t, &pushes[1], &crank2, point);
+    let parts = direct::along_parts(t, along, turn);
+    let second = direct::second(t, psi.margin, serial2, parts);
+    let determinant = direct::determinant(t, phi.margin, psi.margin, cranks);
+    let answer = Answer {
+        columns: [x, point, axis],
+        rows: direct::rows(t, [x, z], [c3, s3], first, second),
+        determinant,
+        serial: [serial1, serial2],
+    };
+    (t.clone(), answer)
+}
+
+#[test]
+fn the_direct_kinematics_is_the_kernels() {
+    let mut random = Random::new(0x1D5E_ED00_0000_0105);
+    let (trace, answer) = whole_direct();
+    let mut answers = 0;
+    for _ in 0..60_000 {
+        let wrist = random.geometry().kernel().expect("within the tolerance");
+        let joints = random.joints();
+        let Ok(found) = wrist.direct(&joints) else {
+            continue;
+        };
+        answers += 1;
+        let mut inputs: Vec<i64> = joints.0.map(|angle| angle.to_q29().into()).to_vec();
+        inputs.extend(wrist.legs.map(|leg| i64::from(leg.zero.to_q29())));
+        for leg in &wrist.legs {
+            inputs.extend(leg.push.back.map(i64::from));
+            inputs.push(leg.push.offset.into());
+            inputs.extend(leg.push.shift.map(i64::from));
+            inputs.extend(leg.push.center.map(i64::from));
+        }
+        inputs.push(wrist.cranks.into());
+        let run = trace.run(&inputs);
+        let all = |values: &[[Value; 3]; 3]| values.map(|row| row.map(|at| run.at(at) as i32));
+        assert_eq!(&all(&answer.columns), found.rotation.columns());
+        assert_eq!(&all(&answer.rows), found.jacobian.torque_rows());
+        assert_eq!(run.at(answer.determinant), found.jacobian.det_a().into());
+        let least = answer.serial.map(|serial| run.at(serial) as i32);
+        assert_eq!(least[0].min(least[1]), found.margin);
+    }
+    assert!(answers > 15_000, "only {answers} answers");
+}
+
+#[test]
+fn without_rounding_the_direct_kinematics_is_the_models() {
+    let mut random = Random::new(0x1D5E_ED00_0000_0106);
+    let (trace, answer) = whole_direct();
+    let mut answers = 0;
+    for _ in 0..20_000 {
+        let geometry = random.geometry();
+        let joints = random.joints();
+        if geometry
+            .kernel()
+            .is_none_or(|wrist| wrist.direct(&joints).is_err())
+        {
+            continue;
+        }
+        answers += 1;
+        let theta = joints.0.map(radians);
+        let mut inputs = theta.to_vec();
+        inputs.extend(geometry.legs.map(|leg| leg.zero[2].atan2(leg.zero[1])));
+        for leg in &geometry.legs {
+            let a = leg.center;
+            let offset = 1.0 + a.dot(&a) + leg.crank.powi(2) - leg.rod.powi(2);
+            inputs.extend((-a / leg.crank).iter());
+            inputs.extend([offset / (2.0 * leg.crank), a[1], 1.0 + a[2], a[1], a[2]]);
+        }
+        inputs.push(geometry.legs[0].crank * geometry.legs[1].crank);
+        let numbers = trace.idealize(&inputs);
+        let rotation = geometry.direct(&theta).expect("joined");
+        let jacobians = geometry.jacobians(&rotation, &theta);
+        let map = jacobians.torque_map().expect("regular");
+        for k in 0..9 {
+            let (i, j) = (k / 3, k % 3);
+            let error = trace.ideal(&numbers, answer.columns[i][j]) - rotation[(j, i)];
+            assert!(error.abs() < 1e-7, "column {i} {j}: {error:e}");
+            let error = trace.ideal(&numbers, answer.rows[i][j]) - map[(i, j)];
+            assert!(error.abs() < 1e-7, "row {i} {j}: {error:e}");
+        }
+        let error = trace.ideal(&numbers, answer.determinant) - jacobians.det_a();
+        assert!(error.abs() < 1e-7, "det A: {error:e}");
+    }
+    assert!(answers > 5_000, "only {answers} answers");
 }
 
 /// Returns an angle in radians.

@@ -9,6 +9,10 @@
 pub struct Value(pub usize);
 
 /// What makes a number of others.
+#[cfg_attr(
+    not(test),
+    expect(dead_code, reason = "only whole chains have them, which tests run")
+)]
 #[derive(Clone, Copy, Debug)]
 pub enum Operation {
     /// From outside.
@@ -114,6 +118,15 @@ impl Trace {
         (0..self.nodes.len()).map(Value)
     }
 
+    /// Finds a number by its name.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn find(&self, name: &str) -> Value {
+        let place = self.nodes.iter().position(|node| node.name == name);
+        Value(place.expect("a number of that name"))
+    }
+
     /// Returns one number.
     pub fn node(&self, value: Value) -> &Node {
         &self.nodes[value.0]
@@ -204,13 +217,6 @@ impl Trace {
         self.push(name, Operation::ReadAs(a), bits, width)
     }
 
-    /// Doubles a number in its format.
-    pub fn double(&mut self, name: &str, a: Value) -> Value {
-        let bits = self.bits(a);
-        let shifted = self.left(&format!("{name}_shifted"), a, 1);
-        self.read_as(name, shifted, bits)
-    }
-
     /// Halves a number in its format, rounded down to a whole step.
     pub fn half(&mut self, name: &str, a: Value, count: u32) -> Value {
         let bits = self.bits(a);
@@ -280,6 +286,10 @@ impl Trace {
     }
 
     /// `sin_cos_near` of an angle in Q29.
+    #[cfg_attr(
+        not(test),
+        expect(dead_code, reason = "only whole chains have them, which tests run")
+    )]
     pub fn sine_cosine(&mut self, name: &str, angle: Value) -> [Value; 2] {
         assert_eq!(self.bits(angle), 29, "{name}: an angle is in Q29");
         let (sine, cosine) = (format!("sine_{name}"), format!("cosine_{name}"));

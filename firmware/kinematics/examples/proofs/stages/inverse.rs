@@ -130,8 +130,14 @@ pub fn small_ratio(trace: &mut Trace, number: Value, divisor: Value) -> Value {
 
 /// The motors' angles from their tangents.
 pub fn angles(trace: &mut Trace, tangents: [Value; 3], zeros: [Value; 2]) -> [Value; 3] {
-    let [turn1, turn2, turn3] = tangents.map(|tangent| trace.arctangent("turn", tangent));
-    let doubled = [turn1, turn2].map(|turn| trace.read_as("doubled", turn, 29));
+    let [turn1, turn2, turn3] = tangents.map(|tangent| {
+        let name = format!("turn_{}", trace.node(tangent).name);
+        trace.arctangent(&name, tangent)
+    });
+    let doubled = [
+        trace.read_as("doubled1", turn1, 29),
+        trace.read_as("doubled2", turn2, 29),
+    ];
     let quarter = trace.constant("quarter", Angle::FRAC_PI_4.to_q29().into(), 29);
     let third = trace.right("third", turn3, 1);
     [
@@ -205,10 +211,10 @@ fn regions() -> [Region; 2] {
             ratio: RATIOS[1].1,
             root: super::primitives::ROOT_FROM_EIGHTH,
             margin: 1.45e-7,
-            left: 1.35e-8,
+            left: 1.42e-8,
             angle_file: "inverse-angle-margin",
             angle_stage: "inverse, θ1 and θ2, margin from 0.57 on",
-            angle: 1.31e-7,
+            angle: 1.33e-7,
         },
     ]
 }
@@ -219,6 +225,7 @@ pub fn scripts() -> Vec<Script> {
         points_script(),
         place_script(),
         third_script(),
+        joints_script(),
         reach_script(),
     ];
     for region in regions() {
@@ -374,6 +381,30 @@ fn third_script() -> Script {
     script.hint("theta - atan_exact -> (theta - turn) + (turn - atan_t) + (half_tangent - exact_half_tangent) * slope;");
     script.claim(format!("|theta - atan_exact| <= {THIRD:e}"));
     script.note("θ3, error in rad", THIRD);
+    script
+}
+
+/// The joints from their arctangents: no overflow.
+fn joints_script() -> Script {
+    let mut script = Script::new("inverse-joints", "inverse, the joints' angles fit", false);
+    let tangents = script.trace.inputs(["t1", "t2", "t3"], 31);
+    let zeros = script.trace.inputs(["zero1", "zero2"], 29);
+    let joints = angles(&mut script.trace, tangents, zeros);
+    script.because("turn: the arctangent of 17/32 is below 0.49. zero: within design's tolerance.");
+    for value in tangents {
+        script.suppose_exact(value, Range(-TANGENT, TANGENT));
+        let turn = format!("turn_{}", script.name(value));
+        script.suppose(format!("|{turn}| <= 0.49"));
+        script.suppose(format!("@FIX({turn},-30)"));
+    }
+    let most = crate::design::kernel::TOLERANCE + 1e-6;
+    for value in zeros {
+        script.suppose_exact(value, Range(-most, most));
+    }
+    for value in &joints[..2] {
+        script.claim(format!("|{}| <= 1.01", script.name(*value)));
+    }
+    script.note("θ1 and θ2, largest", 1.01);
     script
 }
 

@@ -1,6 +1,9 @@
 //! The stages of the kernel, each as a trace and as the scripts that prove it.
 
+pub mod direct;
+pub mod direct_proofs;
 pub mod inverse;
+pub mod jacobian_proofs;
 pub mod primitives;
 
 use crate::script::Script;
@@ -9,5 +12,7 @@ use crate::script::Script;
 pub fn scripts() -> Vec<Script> {
     let mut scripts = primitives::scripts();
     scripts.extend(inverse::scripts());
+    scripts.extend(direct_proofs::scripts());
+    scripts.extend(jacobian_proofs::scripts());
     scripts
 }

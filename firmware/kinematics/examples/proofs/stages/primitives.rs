@@ -16,7 +16,7 @@ pub const ARCTANGENT: f64 = 1.8e-9;
 /// The largest error of `root_near`.
 pub const ROOT: f64 = 2.91e-9;
 /// The largest error of `root_near` from ⅛ on.
-pub const ROOT_FROM_EIGHTH: f64 = 1.4e-9;
+pub const ROOT_FROM_EIGHTH: f64 = 1.8e-9;
 /// The least number that `root_near` takes.
 pub const LEAST_SQUARE: f64 = 1.0 / 32.0;
 /// The largest number that `root_near` takes.
@@ -28,7 +28,10 @@ pub const TANGENT: f64 = 17.0 / 32.0;
 const STEP: f64 = 1.0 / 1_073_741_824.0;
 
 /// A least divisor of `ratio_q30` in Q30, and the largest error from there on.
-pub const RATIOS: [(f64, f64); 3] = [(0.23, 20.2 * STEP), (0.5, 4.2501 * STEP), (1.0, 1.9 * STEP)];
+pub const RATIOS: [(f64, f64); 2] = [(0.23, 20.2 * STEP), (0.5, 4.2501 * STEP)];
+
+/// The largest error of `ratio_q30` for a quotient up to ⅔ and a divisor from 0.37 in Q30 on.
+pub const RATIO_INVERSE: f64 = 5.2 * STEP;
 
 /// Horner's rule with a multiplication and an addition a step.
 fn horner<const N: usize>(
@@ -133,20 +136,17 @@ fn against_truth(script: &mut Script, value: Value, offset: &str, missing: f64, 
 /// The scripts of the primitives.
 pub fn scripts() -> Vec<Script> {
     let mut scripts = vec![sine_script(), arctangent_script()];
+    let whole = 17.0 / 16.0;
+    let stage = "quotient, divisor from 0.23 · 2³⁰ on";
+    scripts.push(ratio_script("ratio-quarter", stage, whole, RATIOS[0]));
+    let stage = "quotient, divisor from 2²⁹ on";
+    scripts.push(ratio_script("ratio-half", stage, whole, RATIOS[1]));
+    let stage = "quotient up to ⅔, divisor from 0.37 · 2³⁰ on";
     scripts.push(ratio_script(
-        "ratio-quarter",
-        "quotient, divisor from 0.23 · 2³⁰ on",
-        RATIOS[0],
-    ));
-    scripts.push(ratio_script(
-        "ratio-half",
-        "quotient, divisor from 2²⁹ on",
-        RATIOS[1],
-    ));
-    scripts.push(ratio_script(
-        "ratio-one",
-        "quotient, divisor from 2³⁰ on",
-        RATIOS[2],
+        "ratio-inverse",
+        stage,
+        0.67,
+        (0.37, RATIO_INVERSE),
     ));
     scripts.push(root_script(
         "root-low",
@@ -190,7 +190,12 @@ fn arctangent_script() -> Script {
 }
 
 /// Divisors from one on; numbers of the other sign mirror everything.
-fn ratio_script(file: &'static str, stage: &'static str, (least, error): (f64, f64)) -> Script {
+fn ratio_script(
+    file: &'static str,
+    stage: &'static str,
+    most: f64,
+    (least, error): (f64, f64),
+) -> Script {
     let mut script = Script::new(file, stage, false);
     script
         .because("number >= 0: SDIV rounds towards zero, so a negative number mirrors every step.");
@@ -199,7 +204,7 @@ fn ratio_script(file: &'static str, stage: &'static str, (least, error): (f64, f
     let low = (least / STEP).floor();
     script.suppose_exact(number, Range(0.0, i32::MAX.into()));
     script.suppose_exact(divisor, Range(low, i32::MAX.into()));
-    script.suppose("number / divisor in [0,1.0625]");
+    script.suppose_within("number / divisor", Range(0.0, most));
     ratio(&mut script.trace, number, divisor);
     let (l, n, d) = ("leading", "number", "divisor");
     let nonzero = format!("{{ {l} <> 0, {d} <> 0 }}");
@@ -234,7 +239,7 @@ fn root_script(file: &'static str, stage: &'static str, range: Range, error: f64
     for rule in ROOT_RULES {
         script.hint(rule);
     }
-    let parts = if range.0 < 0.1 { 20 } else { 44 };
+    let parts = if range.0 < 0.1 { 4 } else { 8 };
     script.hint(format!("$ true_root in {parts};"));
     script.claim(format!("|root - true_root| <= {error:e}"));
     script.note("error", error);
@@ -242,7 +247,8 @@ fn root_script(file: &'static str, stage: &'static str, range: Range, error: f64
 }
 
 /// Heron's steps: (a + s/a)/2 − √s = (a − √s)²/2a, and the same of the residual.
-const ROOT_RULES: [&str; 9] = [
+const ROOT_RULES: [&str; 10] = [
+    "rough - true_root -> (rough_part - square * slope) + slope * (true_root - 0.5 / slope) * (true_root - 0.5 / slope) + (start - 0.25 / slope);",
     "rough + square / rough - 2 * true_root -> (rough - true_root) * (rough - true_root) / rough { rough <> 0 };",
     "twice - 2 * true_root -> (rough + square / rough - 2 * true_root) + (other - square / rough) { rough <> 0 };",
     "twice / 4 + square / twice - true_root -> (twice - 2 * true_root) * (twice - 2 * true_root) / (4 * twice) { twice <> 0 };",
