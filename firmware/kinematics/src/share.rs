@@ -59,6 +59,9 @@ pub struct Shared {
 /// All of it, as a fraction in Q30.
 const WHOLE: i32 = 1 << 30;
 
+/// What each component of a moment must be below to be shared as it is: 8 N·m in Q24, a power of two.
+pub(crate) const MOMENT_LIMIT: i32 = 1 << 27;
+
 /// By how much a component may pass a motor's bound without being cut for it: 0.5 µN·m in Q24.
 const SLACK: u32 = 8;
 
@@ -87,8 +90,8 @@ impl Jacobian {
     fn share_whole(&self, moment: &[Torque; 3], bounds: &[Bounds; 3]) -> Option<[Torque; 3]> {
         let asked = moment.map(Torque::to_q24);
         // Below 8 N·m, so that no motor's part of it passes 120.
-        let [x, y, z] = asked.map(|component| component.wrapping_add(1 << 27) as u32);
-        if (x | y | z) >= 1 << 28 {
+        let [x, y, z] = asked.map(|component| component.wrapping_add(MOMENT_LIMIT) as u32);
+        if (x | y | z) >= 2 * MOMENT_LIMIT as u32 {
             return None;
         }
         let [first, second, third] = self.torque_rows();
@@ -215,7 +218,7 @@ fn feasible(motors: &mut [Motor; 3], wanted: impl Fn(usize) -> i32) -> i32 {
         let room = if room > u32::MAX - 8 * SLACK { 0 } else { room };
         let need = wanted.unsigned_abs();
         if need > room && need - room > SLACK {
-            // Less the quotient's error of 2.8e-9.
+            // Less the quotient's error away from zero, two steps at most.
             let feasible = quotient_q30((room + SLACK) as i32, need as i32) - 3;
             if feasible < fraction {
                 fraction = feasible;

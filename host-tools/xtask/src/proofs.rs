@@ -211,7 +211,10 @@ fn tightened(goal: &str) -> Option<String> {
     if let Some((what, range)) = goal.split_once(" in [") {
         let (low, high) = range.strip_suffix(']')?.split_once(',')?;
         let (low, high): (f64, f64) = (low.parse().ok()?, high.parse().ok()?);
-        return Some(format!("{what} in [{low:e},{:e}]", low + (high - low) / 1e3));
+        return Some(format!(
+            "{what} in [{low:e},{:e}]",
+            low + (high - low) / 1e3
+        ));
     }
     let (what, bound) = goal.split_once(" >= ")?;
     Some(format!("{what} >= {:e}", bound.parse::<f64>().ok()? * 10.0))

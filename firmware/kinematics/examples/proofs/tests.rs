@@ -124,7 +124,7 @@ fn quotient_and_root_are_those_of_eel_units() {
 }
 
 /// The whole inverse, from the pose's angles and the constants to the joints and both margins.
-fn whole_inverse() -> (Trace, [Value; 3], [Value; 2]) {
+fn whole_inverse() -> (Trace, [Value; 3], [Value; 2], [Value; 3]) {
     let mut trace = Trace::default();
     let angles = trace.inputs(["yaw", "pitch", "roll"], 29);
     let pulls = [inverse::pull(&mut trace), inverse::pull(&mut trace)];
@@ -138,7 +138,7 @@ fn whole_inverse() -> (Trace, [Value; 3], [Value; 2]) {
     let third = inverse::small_ratio(&mut trace, number, divisor);
     let tangents = [one.half_tangent, two.half_tangent, third];
     let joints = inverse::angles(&mut trace, tangents, zeros);
-    (trace, joints, [one.margin, two.margin])
+    (trace, joints, [one.margin, two.margin], tangents)
 }
 
 fn inverse_inputs(wrist: &Wrist, pose: &Pose) -> Vec<i64> {
@@ -157,7 +157,7 @@ fn inverse_inputs(wrist: &Wrist, pose: &Pose) -> Vec<i64> {
 #[test]
 fn the_inverse_is_the_kernels() {
     let mut random = Random::new(0x1D5E_ED00_0000_0103);
-    let (trace, joints, margins) = whole_inverse();
+    let (trace, joints, margins, tangents) = whole_inverse();
     let mut answers = 0;
     for _ in 0..40_000 {
         let wrist = random.geometry().kernel().expect("within the tolerance");
@@ -173,6 +173,12 @@ fn the_inverse_is_the_kernels() {
         } = found;
         let wanted = wanted.0.map(|angle| i64::from(angle.to_q29()));
         assert_eq!(joints.map(|joint| run.at(joint)), wanted);
+        for tangent in tangents {
+            assert!(
+                run.at(tangent).abs() <= (17 << 26) + 8,
+                "a tangent beyond ±17/32"
+            );
+        }
         let least = margins.map(|margin| run.at(margin) as i32);
         assert_eq!(times_root_two(least[0].min(least[1])), margin);
     }
@@ -182,7 +188,7 @@ fn the_inverse_is_the_kernels() {
 #[test]
 fn without_rounding_the_inverse_is_the_models() {
     let mut random = Random::new(0x1D5E_ED00_0000_0104);
-    let (trace, joints, _) = whole_inverse();
+    let (trace, joints, ..) = whole_inverse();
     let mut answers = 0;
     for _ in 0..20_000 {
         let geometry = random.geometry();
@@ -217,12 +223,49 @@ fn without_rounding_the_inverse_is_the_models() {
     assert!(answers > 10_000, "only {answers} answers");
 }
 
+#[test]
+fn the_kernel_takes_no_angle_beyond_what_is_proven() {
+    let mut random = Random::new(0x1D5E_ED00_0000_0107);
+    for round in 0..60_000 {
+        let wrist = random.geometry().kernel().expect("within the tolerance");
+        // Most are near home, where nothing but the limit refuses them.
+        let by = random.within(0, 20_000_000) as i32;
+        let limits = [1 << 29, 1 << 28, 1 << 28];
+        let mut angles = [0, 1, 2].map(|_| random.within(-1 << 26, 1 << 26) as i32);
+        let axis = round % 3;
+        angles[axis] = if round % 2 == 0 {
+            limits[axis] + by
+        } else {
+            -limits[axis] - 1 - by
+        };
+        let [yaw, pitch, roll] = angles.map(Angle::from_q29);
+        assert!(
+            wrist.inverse(&Pose { yaw, pitch, roll }).is_err(),
+            "{angles:?}"
+        );
+        let mut joints = [0, 1, 2].map(|_| random.within(-1 << 26, 1 << 26) as i32);
+        let limit = limits[2 * (axis / 2)];
+        joints[axis] = if round % 2 == 0 {
+            limit + by
+        } else {
+            -limit - 1 - by
+        };
+        for (joint, leg) in joints.iter_mut().zip(&wrist.legs) {
+            *joint -= leg.zero.to_q29();
+        }
+        joints[2] += Angle::FRAC_PI_4.to_q29();
+        let joints = Joints(joints.map(Angle::from_q29));
+        assert!(wrist.direct(&joints).is_err(), "{joints:?}");
+    }
+}
+
 /// What the direct kinematics answers with, as numbers of a trace.
 struct Answer {
     columns: [[Value; 3]; 3],
     rows: [[Value; 3]; 3],
     determinant: Value,
     serial: [Value; 2],
+    tangents: [Value; 2],
 }
 
 /// The whole direct kinematics, from the joints' angles and the constants.
@@ -261,6 +304,7 @@ fn whole_direct() -> (Trace, Answer) {
         rows: direct::rows(t, [x, z], [c3, s3], first, second),
         determinant,
         serial: [serial1, serial2],
+        tangents: [phi.tangent, psi.tangent],
     };
     (t.clone(), answer)
 }
@@ -287,6 +331,12 @@ fn the_direct_kinematics_is_the_kernels() {
         }
         inputs.push(wrist.cranks.into());
         let run = trace.run(&inputs);
+        for tangent in answer.tangents {
+            assert!(
+                run.at(tangent).abs() <= (1 << 30) + 8,
+                "a tangent beyond ±½"
+            );
+        }
         let all = |values: &[[Value; 3]; 3]| values.map(|row| row.map(|at| run.at(at) as i32));
         assert_eq!(&all(&answer.columns), found.rotation.columns());
         assert_eq!(&all(&answer.rows), found.jacobian.torque_rows());

@@ -1,10 +1,8 @@
 //! The scripts of the map of torques and of sharing.
 
+use super::columns_proofs::{ALONG_ERROR, SERIAL, given_axes, given_turn};
 use super::direct::{along_parts, determinant, first, rows, second};
-use super::direct_proofs::{
-    ALONG_ERROR, BEHIND, EQUATIONS, LEAN, LEAST_W_SQUARE, SERIAL, given_axes, given_third,
-    given_turn, most_square,
-};
+use super::direct_proofs::{BEHIND, EQUATIONS, LEAN, LEAST_W_SQUARE, given_third, most_square};
 use super::primitives::RATIO_INVERSE;
 use crate::geometry::limits;
 use crate::script::{Range, Script};
@@ -17,7 +15,7 @@ const ENTRIES: [f64; 3] = [5.4, 5.4, 4.0];
 /// The largest error of det A.
 const DETERMINANT: f64 = 1.2e-6;
 /// What a moment's component stays below for all of it to be shared at once, in N·m.
-const MOMENT: f64 = 8.0;
+const MOMENT: f64 = crate::share::MOMENT_LIMIT as f64 / 16_777_216.0;
 
 /// The scripts.
 pub fn scripts() -> Vec<Script> {
@@ -32,7 +30,8 @@ fn given_margins(script: &mut Script, leg: usize) -> [Value; 2] {
     let range = Range(least, most_square(leg).sqrt());
     script.suppose_near(margin, range, EQUATIONS[leg].margin);
     let serial = script.trace.input(names[1], 30);
-    script.suppose_near(serial, Range(0.1249, limits(leg).rod.1), SERIAL[leg]);
+    let least = f64::from(crate::direct::LEAST_SERIAL) / 1_073_741_824.0 - 1e-5;
+    script.suppose_near(serial, Range(least, limits(leg).rod.1), SERIAL[leg]);
     [margin, serial]
 }
 

@@ -222,6 +222,10 @@ fn ratio_script(
     ] {
         script.hint(rule);
     }
+    // Away from zero: sharing relies on it.
+    let away = (1.0 / least + 0.01) * STEP;
+    script.claim(format!("quotient - {n} / {d} <= {away:e}"));
+    script.note("away from zero", away);
     script.claim(format!("|quotient - {n} / {d}| <= {error:e}"));
     script.note("error", error);
     script

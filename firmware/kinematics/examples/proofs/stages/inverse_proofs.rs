@@ -1,0 +1,480 @@
+//! The scripts of `Wrist::inverse`.
+
+use core::f64::consts::FRAC_1_SQRT_2;
+
+use super::inverse::{Pull, Solved, angles, points, pull, small_ratio, solve};
+use super::primitives::{
+    ARCTANGENT, COSINE, LEAST_SQUARE, MOST_SQUARE, RATIOS, ROOT, SINE, TANGENT,
+};
+use crate::geometry::limits;
+use crate::script::{Range, Script};
+use crate::trace::Value;
+
+/// The largest error of x of a platform point over √2.
+const POINT_X: f64 = 5.3e-9;
+/// The largest error of a platform point's coordinate over √2.
+const POINT: f64 = 8.91e-9;
+/// The largest error of θ3.
+const THIRD: f64 = 7.6e-8;
+/// The largest error of E and F.
+const SIDE_E: f64 = 9.38e-9;
+/// The largest error of G.
+const SIDE_G: f64 = 2.14e-8;
+/// The largest error of D/2.
+const SQUARE: f64 = 1.2e-7;
+/// The first, coarse bound of tan(θ/2).
+const COARSE: f64 = 9e-7;
+/// The largest error of a leg's constant, which is rounded to nearest in Q30.
+const CONSTANT: f64 = 0.5 / 1_073_741_824.0;
+
+/// Where a leg's equation is looked at: everywhere, or where the answer's margin is from this on.
+struct Region {
+    files: [&'static str; 2],
+    stages: [&'static str; 2],
+    /// D/2 at least, in the units of the code.
+    least_square: f64,
+    divisor_file: &'static str,
+    divisor_stage: &'static str,
+    /// F + √D at least, over √2, as a proof of ranges shows.
+    least_divisor: f64,
+    /// The largest error of the quotient.
+    ratio: f64,
+    /// The largest error of the root.
+    root: f64,
+    /// The largest error of √(D/2).
+    margin: f64,
+    /// The most that a computed tangent leaves of its equation.
+    left: f64,
+    angle_file: &'static str,
+    angle_stage: &'static str,
+    /// The largest error of θ.
+    angle: f64,
+}
+
+/// G − E and F + √D, over √2, wherever the kernel gets to their quotient.
+const NUMBER: Range = Range(-1.0, 1.85);
+const DIVISOR: Range = Range(0.2, 1.85);
+
+/// The serial margin √D that the paper's workspace keeps on the ideal geometry.
+const WORKSPACE_MARGIN: f64 = 0.57;
+
+fn regions() -> [Region; 2] {
+    [
+        Region {
+            files: ["inverse-leg1", "inverse-leg2"],
+            stages: [
+                "inverse, leg 1, wherever it answers",
+                "inverse, leg 2, wherever it answers",
+            ],
+            divisor_file: "inverse-divisor",
+            divisor_stage: "inverse, least divisor, wherever it answers",
+            least_square: f64::from(crate::inverse::LEAST_SQUARE) / 268_435_456.0,
+            least_divisor: RATIOS[0].0,
+            ratio: RATIOS[0].1,
+            root: ROOT,
+            margin: 3.3e-7,
+            left: 6.2e-8,
+            angle_file: "inverse-angle",
+            angle_stage: "inverse, θ1 and θ2, wherever it answers",
+            angle: 5.6e-7,
+        },
+        Region {
+            files: ["inverse-leg1-margin", "inverse-leg2-margin"],
+            stages: [
+                "inverse, leg 1, margin from 0.57 on",
+                "inverse, leg 2, margin from 0.57 on",
+            ],
+            divisor_file: "inverse-divisor-margin",
+            divisor_stage: "inverse, least divisor, margin from 0.57 on",
+            least_square: WORKSPACE_MARGIN * WORKSPACE_MARGIN / 2.0,
+            least_divisor: RATIOS[1].0,
+            ratio: RATIOS[1].1,
+            root: super::primitives::ROOT_FROM_EIGHTH,
+            margin: 1.45e-7,
+            left: 1.42e-8,
+            angle_file: "inverse-angle-margin",
+            angle_stage: "inverse, θ1 and θ2, margin from 0.57 on",
+            angle: 1.33e-7,
+        },
+    ]
+}
+
+/// The scripts of the inverse.
+pub fn scripts() -> Vec<Script> {
+    let mut scripts = vec![
+        points_script(),
+        place_script(),
+        third_script(),
+        joints_script(),
+        reach_script(),
+    ];
+    for region in regions() {
+        scripts.push(divisor_script(&region));
+        scripts.push(leg_script(&region, 0));
+        scripts.push(leg_script(&region, 1));
+        scripts.push(angle_script(&region));
+    }
+    scripts
+}
+
+/// Supposes of sine and cosine what their proof says, for angles within a range.
+pub fn suppose_sines(script: &mut Script, values: [Value; 2], angle: f64) {
+    let (sine, cosine) = angle.sin_cos();
+    script.suppose_near(values[0], Range(-sine, sine).widened(1e-9), SINE);
+    script.suppose_near(values[1], Range(cosine, 1.0).widened(1e-9), COSINE);
+    let name = script.name(values[1]);
+    script.suppose(format!("{name} <= {}b-30", (1 << 30) - 1));
+}
+
+fn points_script() -> Script {
+    let mut script = Script::new("inverse-points", "inverse, points C1 and C2 over √2", true);
+    script.sharp = true;
+    script.because("Yaw is within 1 rad, pitch and roll within half a radian: Pose::is_near.");
+    let names = [
+        ["sine_yaw", "cosine_yaw"],
+        ["sine_pitch", "cosine_pitch"],
+        ["sine_roll", "cosine_roll"],
+    ];
+    let sines = names.map(|names| script.trace.inputs(names, 30));
+    for (values, angle) in sines.into_iter().zip([1.0, 0.5, 0.5]) {
+        suppose_sines(&mut script, values, angle);
+    }
+    let points = points(&mut script.trace, sines);
+    for [x, y, z] in points {
+        script.claim_near(x, POINT_X, "");
+        script.claim_near(y, POINT, "");
+        script.claim_near(z, POINT, "");
+    }
+    script.note("each coordinate, error", POINT);
+    script
+}
+
+/// A script on exact numbers, G written out: of a leg with D/2 from `least_square` on.
+fn range_script(file: &'static str, stage: &'static str, least_square: f64) -> Script {
+    let mut script = Script::new(file, stage, false);
+    script
+        .because("x, y, z: C over √2, a unit vector; leg 2 mirrors x. All numbers are exact here.");
+    script
+        .because("center: A over √2. G is (u² + E² + F² + (ρ² − s²)/2) / √2 ρ with u = x − A's x.");
+    for line in [
+        "rest = 0.5 - x * x - z * z;",
+        "y = side * sqrt(rest);",
+        "e = y - center_y;",
+        "f = z - center_z;",
+        "u = x - center_x;",
+        "both = rest - 2 * y * center_y + center_y * center_y + f * f;",
+        "g = (u * u + both + lengths) / crank;",
+        "square = both - g * g;",
+        "number = g - e;",
+        "divisor = f + sqrt(square);",
+    ] {
+        script.define(line);
+    }
+    let limits = limits(0);
+    let half = Range(FRAC_1_SQRT_2, FRAC_1_SQRT_2);
+    let unit = FRAC_1_SQRT_2 + 1e-9;
+    script.suppose_within("x", Range(LEAST_X, unit));
+    script.suppose_within("z", Range(LEAST_Z, unit));
+    script.suppose("|side| <= 1");
+    script.suppose("rest >= 0");
+    for (name, range) in ["center_x", "center_y", "center_z"]
+        .iter()
+        .zip(limits.center)
+    {
+        script.suppose_within(name, range.times(half));
+    }
+    let minus = Range(-1.0, -1.0);
+    let lengths = limits.crank.square().plus(limits.rod.square().times(minus));
+    script.suppose_within("lengths", lengths.times(Range(0.5, 0.5)));
+    script.suppose_within("crank", limits.crank.over(half));
+    script.because("square: D/2 from what the code checks, less its error, to s²/2.");
+    script.suppose(format!("square >= {:e}", least_square - 1e-6));
+    let rod = limits.rod.1;
+    script.suppose(format!("square <= {:e}", rod * rod / 2.0));
+    script
+}
+
+/// Numerator and denominator of tan(θ/2) where D suffices.
+fn reach_script() -> Script {
+    let least = regions()[0].least_square;
+    let mut script = range_script(
+        "inverse-range",
+        "inverse, ranges of G − E and F + √D",
+        least,
+    );
+    script.claim_within("number", NUMBER);
+    script.claim_within("divisor", DIVISOR);
+    script.note("G − E, largest", NUMBER.1);
+    script.note("F + √D, largest", DIVISOR.1);
+    script.hint("$ z in 48, x in 12;");
+    script
+}
+
+/// The least denominator where the tangent is one that the code accepts.
+fn divisor_script(region: &Region) -> Script {
+    let (file, stage) = (region.divisor_file, region.divisor_stage);
+    let mut script = range_script(file, stage, region.least_square);
+    script.because("number / divisor: the code's limit, and a little for its errors.");
+    let limit = TANGENT + 1e-5;
+    script.suppose_within("number / divisor", Range(-limit, limit));
+    script.claim(format!("divisor >= {:e}", region.least_divisor));
+    script.note("F + √D, least", region.least_divisor);
+    script.hint("$ z in 64, x in 12;");
+    script
+}
+
+/// Supposes what is known of an arctangent of t and of the exact t.
+fn suppose_arctangent(script: &mut Script) {
+    script.because(
+        "atan_t, atan_exact: the arctangents' difference is that of t over 1 + ξ², ξ between them.",
+    );
+    script.suppose(format!("|turn - atan_t| <= {ARCTANGENT:e}"));
+    script.suppose("|turn| <= 0.6");
+    script.suppose(format!("|steepness| <= {:e}", 1.0 + 3.0 * COARSE));
+}
+
+/// The third motor, from C1 alone.
+fn third_script() -> Script {
+    let mut script = Script::new("inverse-third", "inverse, θ3", true);
+    let [x, y] = script.trace.inputs(["x", "y"], 30);
+    let side = FRAC_1_SQRT_2 + 1e-9;
+    script.suppose_near(x, Range(LEAST_X, side), POINT_X);
+    script.suppose_near(y, Range(-side, side), POINT);
+    let number = script.trace.subtract("number", y, x);
+    let divisor = script.trace.add("divisor", y, x);
+    script.because("exact_divisor: the proof of the places.");
+    let exact = script.exact(divisor);
+    script.suppose(format!("{exact} >= {LEAST_THIRD:e}"));
+    let tangent = small_ratio(&mut script.trace, number, divisor);
+    script.because("half_tangent: small_ratio answers within ±17/32 only.");
+    script.suppose(format!("|number / divisor| <= {TANGENT:e}"));
+    script.suppose_primitive(tangent, RATIOS[0].1);
+    script.claim_near(tangent, COARSE, "");
+    for line in [
+        "slope = steepness / (1 + half_tangent * half_tangent);",
+        "atan_exact = atan_t - (half_tangent - exact_half_tangent) * slope;",
+        "theta = fixed<-29,dn>(turn);",
+    ] {
+        script.define_last(line);
+    }
+    suppose_arctangent(&mut script);
+    script.hint("theta - atan_exact -> (theta - turn) + (turn - atan_t) + (half_tangent - exact_half_tangent) * slope;");
+    script.claim(format!("|theta - atan_exact| <= {THIRD:e}"));
+    script.note("θ3, error in rad", THIRD);
+    script
+}
+
+/// The joints from their arctangents: no overflow.
+fn joints_script() -> Script {
+    let mut script = Script::new("inverse-joints", "inverse, the joints' angles fit", false);
+    let tangents = script.trace.inputs(["t1", "t2", "t3"], 31);
+    let zeros = script.trace.inputs(["zero1", "zero2"], 29);
+    let joints = angles(&mut script.trace, tangents, zeros);
+    script.because("turn: the arctangent of 17/32 is below 0.49. zero: within design's tolerance.");
+    for value in tangents {
+        script.suppose_exact(value, Range(-TANGENT, TANGENT));
+        let turn = format!("turn_{}", script.name(value));
+        script.suppose(format!("|{turn}| <= 0.49"));
+        script.suppose(format!("@FIX({turn},-30)"));
+    }
+    let most = crate::design::kernel::TOLERANCE + 1e-6;
+    for value in zeros {
+        script.suppose_exact(value, Range(-most, most));
+    }
+    for value in &joints[..2] {
+        script.claim(format!("|{}| <= 1.01", script.name(*value)));
+    }
+    script.note("θ1 and θ2, largest", 1.01);
+    script
+}
+
+/// θ, from what its tangent leaves of the equation: far closer than from the tangent's parts.
+fn angle_script(region: &Region) -> Script {
+    let mut script = Script::new(region.angle_file, region.angle_stage, false);
+    script.because(
+        "exact_t = tan(θ/2) of the exact E and F, by which G is given; t is the computed one.",
+    );
+    script.because(
+        "w = √(D/2), from what the code checks. Errors and first bound: the proofs of the legs.",
+    );
+    for line in [
+        "exact_g = (exact_e * (1 - exact_t * exact_t) + 2 * exact_f * exact_t) / (1 + exact_t * exact_t);",
+        "w = exact_f - (exact_e + exact_g) * exact_t;",
+        "left = e * (1 - t * t) + 2 * f * t - g * (1 + t * t);",
+        "exact_left = exact_e * (1 - t * t) + 2 * exact_f * t - exact_g * (1 + t * t);",
+        "theta = 2 * turn - zero;",
+        "slope = steepness / (1 + t * t);",
+        "atan_exact = atan_t - (t - exact_t) * slope;",
+        "exact_theta = 2 * atan_exact - exact_zero;",
+    ] {
+        script.define(line);
+    }
+    script.suppose_within("exact_e", Range(-0.73, 0.73));
+    script.suppose_within("exact_f", Range(-0.1, 1.45));
+    script.suppose_within("exact_g", Range(-1.5, 2.0));
+    script.suppose(format!("w >= {:e}", region.least_square.sqrt() - 1e-6));
+    script.suppose(format!("|exact_t| <= {:e}", TANGENT + COARSE));
+    script.suppose(format!("|e - exact_e| <= {SIDE_E:e}"));
+    script.suppose(format!("|f - exact_f| <= {SIDE_E:e}"));
+    script.suppose(format!("|g - exact_g| <= {SIDE_G:e}"));
+    script.suppose(format!("|t - exact_t| <= {COARSE:e}"));
+    script.suppose(format!("|t| <= {TANGENT:e}"));
+    script.suppose(format!("|left| <= {:e}", region.left));
+    suppose_arctangent(&mut script);
+    script.suppose(format!("|zero - exact_zero| <= {CONSTANT:e}"));
+    script.suppose(format!(
+        "|zero| <= {:e}",
+        crate::design::kernel::TOLERANCE + 1e-6
+    ));
+    script.hint("t - exact_t -> exact_left / (2 * w - (exact_e + exact_g) * (t - exact_t)) { 2 * w - (exact_e + exact_g) * (t - exact_t) <> 0 };");
+    script.hint("exact_left -> left - ((e - exact_e) * (1 - t * t) + 2 * (f - exact_f) * t - (g - exact_g) * (1 + t * t));");
+    script.hint("theta - exact_theta -> 2 * ((turn - atan_t) + (t - exact_t) * slope) - (zero - exact_zero);");
+    script.hint("$ t in 8;");
+    script.claim("theta in [-4,2147483647b-29]");
+    script.claim(format!("|theta - exact_theta| <= {:e}", region.angle));
+    script.note("θ, error in rad", region.angle);
+    script
+}
+
+/// The least |x| of a platform point over √2.
+const LEAST_X: f64 = 0.1745;
+/// Where the platform's points can be for the angles that the kernel takes.
+fn place_script() -> Script {
+    let mut script = Script::new(
+        "inverse-places",
+        "inverse, where C1 and C2 are, over √2",
+        false,
+    );
+    script.because(
+        "Yaw is within 1 rad, pitch and roll within half a radian. All numbers are exact here.",
+    );
+    for line in [
+        "cy = sqrt(1 - sy * sy);",
+        "cp = sqrt(1 - sp * sp);",
+        "cr = sqrt(1 - sr * sr);",
+        "sq = (cr + sr) / 2;",
+        "cq = (cr - sr) / 2;",
+        "x1 = cp * cq;",
+        "x2 = -cp * sq;",
+        "z1 = sy * sq - cy * sp * cq;",
+        "z2 = sy * cq + cy * sp * sq;",
+        "sum = cp * cq + cy * sq + sy * sp * cq;",
+    ] {
+        script.define(line);
+    }
+    for (name, angle) in [("sy", 1.0f64), ("sp", 0.5), ("sr", 0.5)] {
+        let sine = angle.sin() + 1e-9;
+        script.suppose_within(name, Range(-sine, sine));
+    }
+    script.claim_within("x1", Range(LEAST_X, 0.75));
+    script.claim_within("x2", Range(-0.75, -LEAST_X));
+    script.claim_within("z1", Range(LEAST_Z, 0.75));
+    script.claim_within("z2", Range(LEAST_Z, 0.75));
+    script.claim(format!("sum >= {LEAST_THIRD:e}"));
+    script.note("|x|, least", LEAST_X);
+    script.note("z, least", LEAST_Z);
+    script.note("x + y of C1, least", LEAST_THIRD);
+    script.hint("$ sr in 24, sy in 16;");
+    script
+}
+
+/// The least x + y of C1 over √2.
+const LEAST_THIRD: f64 = 0.35;
+/// The least z of a platform point over √2.
+const LEAST_Z: f64 = -0.63;
+
+/// What is known of a platform point and of the constants.
+fn suppose_leg(script: &mut Script, pull: &Pull, point: [Value; 3], leg: usize) {
+    script.because(
+        "C is a unit vector: no coordinate over √2 passes √½. Its x: the proof of the points.",
+    );
+    let side = FRAC_1_SQRT_2 + 1e-9;
+    let x = if leg == 0 {
+        Range(LEAST_X, side)
+    } else {
+        Range(-side, -LEAST_X)
+    };
+    script.suppose_near(point[0], x, POINT_X);
+    script.suppose_near(point[1], Range(-side, side), POINT);
+    script.suppose_near(point[2], Range(LEAST_Z, side), POINT);
+    script.because(
+        "The constants are those of a unit within design's tolerance, rounded to nearest.",
+    );
+    let limits = limits(leg);
+    let half = Range(FRAC_1_SQRT_2, FRAC_1_SQRT_2);
+    for (value, range) in pull.center.into_iter().zip(&limits.center[1..]) {
+        script.suppose_near(value, range.times(half), CONSTANT);
+    }
+    for (value, range) in pull.slope.into_iter().zip(limits.slope) {
+        script.suppose_near(value, range, CONSTANT);
+    }
+    script.suppose_near(pull.offset, limits.offset.times(half), CONSTANT);
+}
+
+fn leg_script(region: &Region, leg: usize) -> Script {
+    let mut script = Script::new(region.files[leg], region.stages[leg], true);
+    let point = script.trace.inputs(["x", "y", "z"], 30);
+    let pull = pull(&mut script.trace);
+    suppose_leg(&mut script, &pull, point, leg);
+    let solved = solve(&mut script.trace, &pull, point);
+    let Solved {
+        e,
+        f,
+        g,
+        square,
+        root_of,
+        margin,
+        number,
+        divisor,
+        half_tangent,
+    } = solved;
+    script.because("square: the kernel answers from LEAST_SQUARE on.");
+    let (name, exact) = (script.name(square), script.exact(square));
+    script.suppose(format!("{name} >= {:e}", region.least_square));
+    script.because("exact_square: √D is (l×r)·i / ρ, and |l×r| is at most ρ s.");
+    let rod = limits(leg).rod.1;
+    script.suppose(format!("{exact} <= {:e}", rod * rod / 2.0));
+    script.hint(format!("{name} -> {exact} + ({name} - {exact});"));
+    script.hint(format!("{exact} -> {name} - ({name} - {exact});"));
+    script.claim_within(&script.name(root_of), Range(LEAST_SQUARE, MOST_SQUARE));
+    script.suppose_primitive(margin, region.root);
+    script.because("exact_number, exact_divisor: the proof of the ranges.");
+    script.suppose_within(&script.exact(number), NUMBER);
+    script.suppose_within(
+        &script.exact(divisor),
+        Range(region.least_divisor, DIVISOR.1),
+    );
+    script.because("half_tangent: small_ratio answers within ±17/32 only.");
+    let quotient = format!("{} / {}", script.name(number), script.name(divisor));
+    script.suppose(format!("|{quotient}| <= {TANGENT:e}"));
+    script.suppose_primitive(half_tangent, region.ratio);
+    script.claim_near(e, SIDE_E, "");
+    script.claim_near(f, SIDE_E, "");
+    script.claim_near(g, SIDE_G, "G, error");
+    script.claim_near(square, SQUARE, "D/2, error");
+    script.claim_near(margin, region.margin, "√(D/2), error");
+    script.claim_near(half_tangent, COARSE, "tan(θ/2), first bound");
+    // What the computed tangent leaves of the equation with the computed E, F, G: h(t).
+    let [e, f, g, m] = [e, f, g, margin].map(|value| script.name(value));
+    let (n, d, t) = (
+        script.name(number),
+        script.name(divisor),
+        script.name(half_tangent),
+    );
+    let (square, root_of) = (script.name(square), script.name(root_of));
+    script.define_last(format!(
+        "left = {e} * (1 - {t} * {t}) + 2 * {f} * {t} - {g} * (1 + {t} * {t});"
+    ));
+    script.hint(format!(
+        "left -> ({n} / {d}) / {d} * ({square} - {m} * {m}) + ({t} - {n} / {d}) * (2 * {f} - ({e} + {g}) * ({t} + {n} / {d})) {{ {d} <> 0 }};"
+    ));
+    script.hint(format!(
+        "{square} - {m} * {m} -> ({square} - {root_of}) + ({root_of} - {m} * {m});"
+    ));
+    script.hint(format!(
+        "{root_of} - {m} * {m} -> (sqrt({root_of}) - {m}) * (sqrt({root_of}) + {m}) {{ {root_of} >= 0 }};"
+    ));
+    script.claim(format!("|left| <= {:e}", region.left));
+    script.note("equation left over", region.left);
+    script
+}
