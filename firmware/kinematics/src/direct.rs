@@ -186,7 +186,7 @@ impl Root {
         }
         // W²/4 in Q31, W/2 in Q30: W in Q29.
         let margin = root_near((square >> 29) as i32);
-        // N + K is below 3.7; where it is not positive one of the tests holds.
+        // N + K is below 3.95; where it is not positive one of the tests holds.
         let below = n - k;
         let above = if SIDE < 0 { margin - m } else { m - margin } << 1;
         if above >= below || above <= -below {

@@ -10,14 +10,14 @@ use crate::trace::Value;
 /// The largest error of a constant in Q29, rounded to nearest.
 pub const CONSTANT: f64 = 1.0 / 1_073_741_824.0;
 /// The largest error of the sine and cosine of θ3.
-pub const THIRD: f64 = 3.8e-9;
+pub const THIRD: f64 = 5.1e-9;
 /// The largest errors of −B / ρ: y and z.
-const BACK: [f64; 2] = [4.7e-9, 3.7e-9];
+const BACK: [f64; 2] = [5.7e-9, 4.6e-9];
 /// The largest error of N.
-const OFFSET: f64 = 7e-9;
+const OFFSET: f64 = 8e-9;
 /// The largest errors of K, in either equation, and of leg 2's M.
-pub const BEHIND: f64 = 1.6e-8;
-pub const ACROSS2: f64 = 3.7e-7;
+pub const BEHIND: f64 = 1.95e-8;
+pub const ACROSS2: f64 = 4.05e-7;
 /// Returns W² at most, (s/ρ)², on a leg.
 pub fn most_square(leg: usize) -> f64 {
     let limits = limits(leg);
@@ -62,9 +62,9 @@ pub const EQUATIONS: [Equation; 2] = [
         m: Range(0.5, 2.34),
         m_error: BACK[1],
         left: 3e-8,
-        margin: 7.5e-8,
-        coarse: 9.3e-8,
-        tangent: 3.8e-8,
+        margin: 8.8e-8,
+        coarse: 1.08e-7,
+        tangent: 4.15e-8,
     },
     Equation {
         leg: 1,
@@ -77,16 +77,16 @@ pub const EQUATIONS: [Equation; 2] = [
         m: Range(-2.6, 2.6),
         m_error: ACROSS2,
         left: 3.1e-8,
-        margin: 1.35e-6,
-        coarse: 1.75e-6,
-        tangent: 2.85e-7,
+        margin: 1.5e-6,
+        coarse: 1.95e-6,
+        tangent: 3.15e-7,
     },
 ];
 
 /// K (negative), N, the denominator and the numerator of the tangent.
 const MINUS_K: Range = Range(-1.6, -0.5);
 const N: Range = Range(0.3, 2.45);
-const BELOW: Range = Range(1.0, 3.95);
+const BELOW: Range = Range(1.01, 3.95);
 const ABOVE: Range = Range(-1.9, 1.9);
 /// P / W on leg 1 where φ is found.
 pub const LEAN: Range = Range(-1.25, 1.25);
@@ -107,7 +107,7 @@ fn third_script() -> Script {
     let mut script = Script::new("direct-third", "direct, sine and cosine of θ3", true);
     script.because("The third motor is within half a radian of home: are_near.");
     let values = script.trace.inputs(["sine", "cosine"], 30);
-    suppose_sines(&mut script, values, 0.5);
+    suppose_sines(&mut script, values, 0.5, CONSTANT);
     let [c3, s3] = third(&mut script.trace, values);
     script.because("exact_cosine: of the same angle as exact_sine.");
     script.define("exact_cosine = sqrt(1 - exact_sine * exact_sine);");
@@ -149,7 +149,7 @@ fn crank_script() -> Script {
     let mut script = Script::new("direct-crank", "direct, a crank's end and N", true);
     script.because("A crank is within one radian: are_near.");
     let values = script.trace.inputs(["sine", "cosine"], 30);
-    suppose_sines(&mut script, values, 1.0);
+    suppose_sines(&mut script, values, 1.0, CONSTANT);
     let push = super::direct::push(&mut script.trace);
     suppose_push(&mut script, &push, 0);
     let crank = turned(&mut script.trace, &push, values);

@@ -64,8 +64,8 @@ pub struct Solved {
     pub half_tangent: Value,
 }
 
-/// `Pull::solve`.
-pub fn solve(trace: &mut Trace, pull: &Pull, point: [Value; 3]) -> Solved {
+/// E, F, G and D/2 of `Pull::solve`.
+pub fn terms(trace: &mut Trace, pull: &Pull, point: [Value; 3]) -> [Value; 4] {
     let e = trace.subtract("e", point[1], pull.center[0]);
     let f = trace.subtract("f", point[2], pull.center[1]);
     let [x, y, z] = pull.slope;
@@ -73,6 +73,12 @@ pub fn solve(trace: &mut Trace, pull: &Pull, point: [Value; 3]) -> Solved {
     let g = trace.subtract("g", pull.offset, along);
     let minus_g = trace.negate("minus_g", g);
     let square = trace.products("square", &[(e, e), (f, f), (g, minus_g)]);
+    [e, f, g, square]
+}
+
+/// `Pull::solve`.
+pub fn solve(trace: &mut Trace, pull: &Pull, point: [Value; 3]) -> Solved {
+    let [e, f, g, square] = terms(trace, pull, point);
     let root_of = trace.right("root_of", square, 29);
     let margin = trace.root("margin", root_of);
     let number = trace.subtract("number", g, e);

@@ -2,7 +2,7 @@
 
 use core::f64::consts::FRAC_1_SQRT_2;
 
-use super::inverse::{Pull, Solved, angles, points, pull, small_ratio, solve};
+use super::inverse::{Pull, Solved, angles, points, pull, small_ratio, solve, terms};
 use super::primitives::{
     ARCTANGENT, COSINE, LEAST_SQUARE, MOST_SQUARE, RATIOS, ROOT, SINE, TANGENT,
 };
@@ -15,7 +15,7 @@ const POINT_X: f64 = 5.3e-9;
 /// The largest error of a platform point's coordinate over √2.
 const POINT: f64 = 8.91e-9;
 /// The largest error of θ3.
-const THIRD: f64 = 7.6e-8;
+const THIRD: f64 = 7.7e-8;
 /// The largest error of E and F.
 const SIDE_E: f64 = 9.38e-9;
 /// The largest error of G.
@@ -39,7 +39,8 @@ struct Region {
     least_divisor: f64,
     /// The largest error of the quotient.
     ratio: f64,
-    /// The largest error of the root.
+    /// The least number of which the root is taken, and the root's largest error from there on.
+    least_root: f64,
     root: f64,
     /// The largest error of √(D/2).
     margin: f64,
@@ -71,12 +72,13 @@ fn regions() -> [Region; 2] {
             least_square: f64::from(crate::inverse::LEAST_SQUARE) / 268_435_456.0,
             least_divisor: RATIOS[0].0,
             ratio: RATIOS[0].1,
+            least_root: LEAST_SQUARE,
             root: ROOT,
             margin: 3.3e-7,
             left: 6.2e-8,
             angle_file: "inverse-angle",
             angle_stage: "inverse, θ1 and θ2, wherever it answers",
-            angle: 5.6e-7,
+            angle: 5.61e-7,
         },
         Region {
             files: ["inverse-leg1-margin", "inverse-leg2-margin"],
@@ -89,12 +91,13 @@ fn regions() -> [Region; 2] {
             least_square: WORKSPACE_MARGIN * WORKSPACE_MARGIN / 2.0,
             least_divisor: RATIOS[1].0,
             ratio: RATIOS[1].1,
+            least_root: 0.125,
             root: super::primitives::ROOT_FROM_EIGHTH,
             margin: 1.45e-7,
             left: 1.42e-8,
             angle_file: "inverse-angle-margin",
             angle_stage: "inverse, θ1 and θ2, margin from 0.57 on",
-            angle: 1.33e-7,
+            angle: 1.34e-7,
         },
     ]
 }
@@ -106,6 +109,8 @@ pub fn scripts() -> Vec<Script> {
         place_script(),
         third_script(),
         joints_script(),
+        terms_script(0),
+        terms_script(1),
         reach_script(),
     ];
     for region in regions() {
@@ -117,11 +122,15 @@ pub fn scripts() -> Vec<Script> {
     scripts
 }
 
-/// Supposes of sine and cosine what their proof says, for angles within a range.
-pub fn suppose_sines(script: &mut Script, values: [Value; 2], angle: f64) {
+/// Supposes of sine and cosine what their proof says, for angles within a range that are off by a rounding.
+pub fn suppose_sines(script: &mut Script, values: [Value; 2], angle: f64, rounding: f64) {
     let (sine, cosine) = angle.sin_cos();
-    script.suppose_near(values[0], Range(-sine, sine).widened(1e-9), SINE);
-    script.suppose_near(values[1], Range(cosine, 1.0).widened(1e-9), COSINE);
+    script.suppose_near(values[0], Range(-sine, sine).widened(1e-9), SINE + rounding);
+    script.suppose_near(
+        values[1],
+        Range(cosine, 1.0).widened(1e-9),
+        COSINE + rounding,
+    );
     let name = script.name(values[1]);
     script.suppose(format!("{name} <= {}b-30", (1 << 30) - 1));
 }
@@ -137,7 +146,7 @@ fn points_script() -> Script {
     ];
     let sines = names.map(|names| script.trace.inputs(names, 30));
     for (values, angle) in sines.into_iter().zip([1.0, 0.5, 0.5]) {
-        suppose_sines(&mut script, values, angle);
+        suppose_sines(&mut script, values, angle, 0.0);
     }
     let points = points(&mut script.trace, sines);
     for [x, y, z] in points {
@@ -217,7 +226,8 @@ fn divisor_script(region: &Region) -> Script {
     script.because("number / divisor: the code's limit, and a little for its errors.");
     let limit = TANGENT + 1e-5;
     script.suppose_within("number / divisor", Range(-limit, limit));
-    script.claim(format!("divisor >= {:e}", region.least_divisor));
+    // A little more, for the errors of the computed one.
+    script.claim(format!("divisor >= {:e}", region.least_divisor + 1e-5));
     script.note("F + √D, least", region.least_divisor);
     script.hint("$ z in 64, x in 12;");
     script
@@ -253,13 +263,16 @@ fn third_script() -> Script {
     for line in [
         "slope = steepness / (1 + half_tangent * half_tangent);",
         "atan_exact = atan_t - (half_tangent - exact_half_tangent) * slope;",
-        "theta = fixed<-29,dn>(turn);",
+        "theta = quarter + fixed<-29,dn>(turn);",
+        "exact_theta = exact_quarter + atan_exact;",
     ] {
         script.define_last(line);
     }
     suppose_arctangent(&mut script);
-    script.hint("theta - atan_exact -> (theta - turn) + (turn - atan_t) + (half_tangent - exact_half_tangent) * slope;");
-    script.claim(format!("|theta - atan_exact| <= {THIRD:e}"));
+    script.hint("theta - exact_theta -> (quarter - exact_quarter) + (fixed<-29,dn>(turn) - turn) + (turn - atan_t) + (half_tangent - exact_half_tangent) * slope;");
+    script.because("quarter: π/4 in Q29.");
+    script.suppose(format!("|quarter - exact_quarter| <= {:e}", 2.0 * CONSTANT));
+    script.claim(format!("|theta - exact_theta| <= {THIRD:e}"));
     script.note("θ3, error in rad", THIRD);
     script
 }
@@ -321,7 +334,7 @@ fn angle_script(region: &Region) -> Script {
     script.suppose(format!("|t| <= {TANGENT:e}"));
     script.suppose(format!("|left| <= {:e}", region.left));
     suppose_arctangent(&mut script);
-    script.suppose(format!("|zero - exact_zero| <= {CONSTANT:e}"));
+    script.suppose(format!("|zero - exact_zero| <= {:e}", 2.0 * CONSTANT));
     script.suppose(format!(
         "|zero| <= {:e}",
         crate::design::kernel::TOLERANCE + 1e-6
@@ -411,6 +424,27 @@ fn suppose_leg(script: &mut Script, pull: &Pull, point: [Value; 3], leg: usize) 
     script.suppose_near(pull.offset, limits.offset.times(half), CONSTANT);
 }
 
+/// What is computed before anything is known of D.
+fn terms_script(leg: usize) -> Script {
+    let (file, stage) = [
+        (
+            "inverse-leg1-terms",
+            "inverse, leg 1, E, F, G before any check",
+        ),
+        (
+            "inverse-leg2-terms",
+            "inverse, leg 2, E, F, G before any check",
+        ),
+    ][leg];
+    let mut script = Script::new(file, stage, true);
+    let point = script.trace.inputs(["x", "y", "z"], 30);
+    let pull = pull(&mut script.trace);
+    suppose_leg(&mut script, &pull, point, leg);
+    let [_, _, g, _] = terms(&mut script.trace, &pull, point);
+    script.claim_near(g, SIDE_G, "G, error");
+    script
+}
+
 fn leg_script(region: &Region, leg: usize) -> Script {
     let mut script = Script::new(region.files[leg], region.stages[leg], true);
     let point = script.trace.inputs(["x", "y", "z"], 30);
@@ -436,14 +470,17 @@ fn leg_script(region: &Region, leg: usize) -> Script {
     script.suppose(format!("{exact} <= {:e}", rod * rod / 2.0));
     script.hint(format!("{name} -> {exact} + ({name} - {exact});"));
     script.hint(format!("{exact} -> {name} - ({name} - {exact});"));
-    script.claim_within(&script.name(root_of), Range(LEAST_SQUARE, MOST_SQUARE));
+    script.claim_within(&script.name(root_of), Range(region.least_root, MOST_SQUARE));
+    script.claim(format!(
+        "{} >= {:e}",
+        script.name(divisor),
+        region.least_divisor
+    ));
     script.suppose_primitive(margin, region.root);
     script.because("exact_number, exact_divisor: the proof of the ranges.");
     script.suppose_within(&script.exact(number), NUMBER);
-    script.suppose_within(
-        &script.exact(divisor),
-        Range(region.least_divisor, DIVISOR.1),
-    );
+    let least = region.least_divisor + 1e-5;
+    script.suppose_within(&script.exact(divisor), Range(least, DIVISOR.1));
     script.because("half_tangent: small_ratio answers within ±17/32 only.");
     let quotient = format!("{} / {}", script.name(number), script.name(divisor));
     script.suppose(format!("|{quotient}| <= {TANGENT:e}"));
