@@ -5,6 +5,7 @@ pub mod direct;
 pub mod direct_proofs;
 pub mod inverse;
 pub mod inverse_proofs;
+pub mod inverse_ranges;
 pub mod jacobian_proofs;
 pub mod primitives;
 
