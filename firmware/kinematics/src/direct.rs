@@ -12,9 +12,9 @@ use crate::vector::{Vector, dot, high, times_root_two, wide};
 use crate::wrist::{Push, Wrist};
 
 /// The least assembly margin of a leg, W = ¾ where home has √2: its square in Q26.
-const LEAST_ASSEMBLY_SQUARE: i32 = 9 << 22;
+pub(crate) const LEAST_ASSEMBLY_SQUARE: i32 = 9 << 22;
 /// The least serial margin: ⅛ in Q30.
-const LEAST_SERIAL: i32 = 1 << 27;
+pub(crate) const LEAST_SERIAL: i32 = 1 << 27;
 
 /// What the direct kinematics gives for three motor angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,7 +195,7 @@ impl Root {
         }
         // W²/4 in Q31, W/2 in Q30: W in Q29.
         let margin = root_near((square >> 29) as i32);
-        // N + K is below 3.7; where it is not positive one of the tests holds.
+        // N + K is below 3.95; where it is not positive one of the tests holds.
         let below = n - k;
         let above = if SIDE < 0 { margin - m } else { m - margin };
         let half = below >> 1;

@@ -14,10 +14,10 @@ use crate::vector::{Vector, dot, high, times_root_two, wide};
 use crate::wrist::{Pull, Wrist};
 
 /// The least D/2 of a leg in Q28, the high half of its Q60: a margin of ¼.
-const LEAST_SQUARE: i32 = 1 << 23;
+pub(crate) const LEAST_SQUARE: i32 = 1 << 23;
 
 /// The least assembly margin W2 in Q28: ¾, where home has √2. The direct kinematics has the same.
-const LEAST_ASSEMBLY: i32 = 3 << 26;
+pub(crate) const LEAST_ASSEMBLY: i32 = 3 << 26;
 
 /// What the inverse kinematics gives for a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -179,7 +179,7 @@ impl Pull {
     /// Solves E cos θ + F sin θ = G for the platform's point C over √2 (Q30).
     #[inline(always)]
     fn solve(&self, point: &Vector) -> Result<Solved, PoseError> {
-        // All over 2ρ and √2. |E| ≤ 0.8, |F| ≤ 1.5, |G| ≤ 2: within Q30.
+        // All over 2ρ and √2. |E| ≤ 0.74, |F| ≤ 1.44, −0.9 ≤ G ≤ 2: within Q30.
         let e = point[1] - self.center[0];
         let f = point[2] - self.center[1];
         let g = self.offset - (dot(point, &self.slope) >> 30) as i32;
@@ -244,7 +244,7 @@ impl Pull {
 #[inline(always)]
 fn small_ratio(number: i32, divisor: i32) -> Option<i32> {
     let reach = (divisor >> 1) + (divisor >> 5);
-    // A sum beyond 2³¹ wraps to more than twice the reach: refused all the same.
+    // The sum can pass 2³¹ (a unit at its tolerances, far out): as u32 it still is the sum.
     if number.wrapping_add(reach) as u32 >= (reach << 1) as u32 {
         return None;
     }

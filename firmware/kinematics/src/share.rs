@@ -59,6 +59,9 @@ pub struct Shared {
 /// All of it, as a fraction in Q30.
 const WHOLE: i32 = 1 << 30;
 
+/// What each component of a moment must be below to be shared as it is: 8 N·m in Q24, a power of two.
+pub(crate) const MOMENT_LIMIT: i32 = 1 << 27;
+
 /// By how much a component may pass a motor's bound without being cut for it, in Q20: 1 µN·m.
 const SLACK: i32 = 1;
 
@@ -88,8 +91,8 @@ impl Jacobian {
     fn share_whole(&self, moment: &[Torque; 3], bounds: &[Bounds; 3]) -> Option<[Torque; 3]> {
         let asked = moment.map(Torque::to_q24);
         // Below 8 N·m, so that no motor's part of it passes 120.
-        let [x, y, z] = asked.map(|component| component.wrapping_add(1 << 27) as u32);
-        if (x | y | z) >= 1 << 28 {
+        let [x, y, z] = asked.map(|component| component.wrapping_add(MOMENT_LIMIT) as u32);
+        if (x | y | z) >= 2 * MOMENT_LIMIT as u32 {
             return None;
         }
         let [first, second, third] = self.torque_rows();
@@ -215,7 +218,7 @@ impl Motors {
         if need <= room {
             return WHOLE;
         }
-        // Less the quotient's error of 1.9e-9.
+        // Less the quotient's error away from zero, two steps at most.
         (quotient_q30(room, need) - 2).max(0)
     }
 }

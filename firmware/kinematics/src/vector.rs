@@ -27,17 +27,20 @@ pub(crate) const fn high(sum: i64) -> i32 {
     (sum >> 32) as i32
 }
 
+/// √½ − 1 in Q32.
+pub(crate) const ROOT_HALF_LESS_ONE_Q32: i32 = -1_257_966_796;
+/// √2 − 1 in Q32.
+pub(crate) const ROOT_TWO_LESS_ONE_Q32: i32 = 1_779_033_704;
+
 /// Returns √½ of a number: itself less 1 − √½ of it.
 #[inline(always)]
 pub(crate) fn over_root_two(number: i32) -> i32 {
-    const ROOT_HALF_LESS_ONE_Q32: i32 = -1_257_966_796;
     multiply_high_add(number, number, ROOT_HALF_LESS_ONE_Q32)
 }
 
 /// Returns √2 times a number: itself and √2 − 1 of it.
 #[inline(always)]
 pub(crate) fn times_root_two(number: i32) -> i32 {
-    const ROOT_TWO_LESS_ONE_Q32: i32 = 1_779_033_704;
     multiply_high_add(number, number, ROOT_TWO_LESS_ONE_Q32)
 }
 

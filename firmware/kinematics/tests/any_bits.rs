@@ -5,7 +5,7 @@ mod common;
 
 use common::{Q29, Random, angle_between, exact_joints, exact_rotation, matrix, radians};
 use eel_kinematics::design::Geometry;
-use eel_kinematics::{Bounds, Joints, Policy, Pose, Rotation, Wrist};
+use eel_kinematics::{Bounds, Joints, Policy, Pose, PoseError, Rotation, Wrist};
 use eel_units::{Angle, AngularVelocity, Torque};
 
 /// Bits of every magnitude: full range, the kernel's range, corners.
@@ -215,4 +215,18 @@ fn poses_and_orientations_survive_every_input() {
         );
         previous = rotation;
     }
+}
+
+#[test]
+fn a_unit_at_its_tolerances_refuses_a_pose_whose_limit_passes_the_format() {
+    // Found by the ranges of the proofs: G − E plus 17/32 of F + √D is above 2 here, more than Q30 holds.
+    let mut geometry = Geometry::PARALLEL_ACTUATORS;
+    let leg = &mut geometry.legs[0];
+    leg.center = [0.713_063_264_7, 0.018_077_002_9, -1.019_9].into();
+    leg.crank = 0.715_216_816_4;
+    leg.rod = 1.012_446_680_7;
+    let wrist = geometry.kernel().expect("within the tolerance");
+    let [yaw, pitch, roll] = [535_258_380, -268_435_455, -149_052_183].map(Angle::from_q29);
+    let answer = wrist.inverse(&Pose { yaw, pitch, roll });
+    assert_eq!(answer, Err(PoseError::OutOfReach));
 }

@@ -19,6 +19,8 @@ mod quantity;
 mod time;
 mod trigonometry;
 
+#[doc(hidden)]
+pub use arithmetic::{ROOT_SLOPE_Q16, ROOT_START_Q15};
 pub use arithmetic::{
     quotient_q30, ratio_q30, root_near, root_q30, round_shift, round_shift_saturating, saturate,
 };

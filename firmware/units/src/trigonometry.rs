@@ -5,7 +5,8 @@ use crate::arithmetic::quotient_q30;
 use crate::coefficients::{ANGLE_OVER_SINE, COEFFICIENTS};
 use crate::machine::{from_memory, multiply_high, multiply_high_add};
 
-/// Returns sine and cosine in Q30 of angles within −1..1 rad, wrong by at most 2.8e-9 each.
+/// Returns sine and cosine in Q30 of angles within −1..1 rad, wrong by at most 2.8e-9 each (proven: the
+/// sine by 1.77e-9, the cosine by 2.81e-9).
 ///
 /// Neither passes 2³⁰ − 1. Beyond that range the answer is meaningless (and no more than that);
 /// [`Angle::sin_cos`] takes every angle. All angles go through the polynomial together, so that each
@@ -39,7 +40,8 @@ fn sin_cos_q31<const N: usize>(angles: [i32; N]) -> [(i32, i32); N] {
     core::array::from_fn(|k| (sines[k], cosines[k]))
 }
 
-/// Returns the arctangents in Q30 radians of Q31 tangents within ±17/32, wrong by at most 1.4e-9.
+/// Returns the arctangents in Q30 radians of Q31 tangents within ±17/32, wrong by at most 1.4e-9
+/// (measured; 1.8e-9 is proven).
 ///
 /// The same integer read in Q29 is twice the arctangent. Beyond the range the answer is meaningless, and
 /// no more than that.

@@ -174,6 +174,18 @@ fn ratios_are_wrong_by_at_most_four_parts_in_a_billion() {
 }
 
 #[test]
+fn a_ratio_reaches_four_steps_of_error_where_the_divisor_s_low_digit_is_full() {
+    let (number, divisor) = (1 << 29, (1 << 29) + (1 << 15) - 1);
+    let error =
+        f64::from(ratio_q30(number, divisor)) / Q30 - f64::from(number) / f64::from(divisor);
+    assert!((-3.96e-9..-3.6e-9).contains(&error), "{error:e}");
+    let (number, divisor) = (1 << 28, (1 << 28) + (1 << 15) - 1);
+    let error =
+        f64::from(ratio_q30(number, divisor)) / Q30 - f64::from(number) / f64::from(divisor);
+    assert!((-1.59e-8..-1.4e-8).contains(&error), "{error:e}");
+}
+
+#[test]
 fn quotients_survive_every_input_and_are_right_where_they_should() {
     let seed = 0x5DEE_CE66_D1CE_4E5B;
     println!("seed {seed:#x}");

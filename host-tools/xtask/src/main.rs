@@ -13,6 +13,7 @@ mod generated;
 mod image;
 mod panics;
 mod process;
+mod proofs;
 mod setup;
 mod suite;
 mod vcan;
@@ -71,6 +72,10 @@ enum Task {
     Size,
     /// Fails when a panicking symbol is reachable from the logic crates on the target.
     Panics,
+    /// Proves with Gappa that the wrist's kernel never overflows, and how wrong it can be.
+    ///
+    /// The scripts stay in target/proofs.
+    Proofs,
     /// Checks every single input of the fixed-point primitives, on all processors of this machine.
     Exhaustive,
     /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU, beside f32 with
@@ -100,6 +105,7 @@ fn main() -> ExitCode {
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
         Task::Exhaustive => exhaustive::check(),
+        Task::Proofs => proofs::run(),
         Task::Cycles { json, check } => cycles::run(json, check),
     };
     match done {

@@ -18,11 +18,16 @@ struct Tool {
 }
 
 /// What the tests need beyond cargo and the cross compiler.
-const TOOLS: [Tool; 7] = [
+const TOOLS: [Tool; 8] = [
     Tool {
         purpose: "running images",
         witness: "qemu-system-arm",
         package: "qemu-system-arm",
+    },
+    Tool {
+        purpose: "proofs of the kernel",
+        witness: "gappa",
+        package: "gappa",
     },
     Tool {
         purpose: "a vcan0",

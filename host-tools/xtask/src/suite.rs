@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, exhaustive, firmware, generated, panics, setup, vcan};
+use crate::{cycles, exhaustive, firmware, generated, panics, proofs, setup, vcan};
 
 /// One step: its name, and whether a fast run has it.
 struct Step {
@@ -16,7 +16,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     Step {
         name: "tools",
         in_fast: false,
@@ -46,6 +46,11 @@ const STEPS: [Step; 12] = [
         name: "the kernel's budgets",
         in_fast: false,
         run: || cycles::run(false, true),
+    },
+    Step {
+        name: "proofs",
+        in_fast: false,
+        run: proofs::run,
     },
     Step {
         name: "tests",

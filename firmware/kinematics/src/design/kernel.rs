@@ -10,7 +10,7 @@ use crate::wrist::{self, Pull, Push};
 
 /// How far each length and zero may be from the paper's: 2 % of the platform's arm (or of itself).
 /// A hair more, so that a part at exactly 2 % passes.
-const TOLERANCE: f64 = 0.02 + 1e-12;
+pub(crate) const TOLERANCE: f64 = 0.02 + 1e-12;
 
 impl Geometry {
     /// Returns the kernel of a unit with parallel actuators, of whatever scale.

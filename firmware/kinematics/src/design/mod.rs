@@ -11,7 +11,7 @@ mod closed;
 mod condition;
 mod geometry;
 mod jacobians;
-mod kernel;
+pub(crate) mod kernel;
 mod margins;
 mod modes;
 mod travel;
