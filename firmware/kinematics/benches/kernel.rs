@@ -99,6 +99,15 @@ fn inverse(bencher: Bencher) {
     each(bencher, |case| black_box(&Wrist::PAPER).inverse(&case.pose));
 }
 
+/// The platform and its margin alone, as the model's `design_direct` gives it: nobody asks for the Jacobian.
+#[divan::bench]
+fn direct_platform(bencher: Bencher) {
+    each(bencher, |case| {
+        let direct = black_box(&Wrist::PAPER).direct(&case.joints);
+        direct.map(|direct| (direct.rotation, direct.margin()))
+    });
+}
+
 #[divan::bench]
 fn direct(bencher: Bencher) {
     each(bencher, |case| {

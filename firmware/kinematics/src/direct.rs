@@ -63,7 +63,7 @@ impl Wrist {
     /// [`PoseError::OutOfReach`] where the parts can't be joined at these angles, or they lie beyond
     /// the range of the kernel; [`PoseError::Singular`] where an assembly margin has shrunk to about
     /// half of home's or a serial margin to ⅛.
-    #[inline]
+    #[inline(always)]
     pub fn direct(&self, joints: &Joints) -> Result<Direct, PoseError> {
         let [leg1, leg2] = &self.legs;
         let angles = [

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use crate::cycles::Core;
 
 /// By how much a median may exceed its budget.
-const TOLERANCE: f64 = 1.02;
+pub const TOLERANCE: f64 = 1.02;
 /// What the name of a call in single precision ends with: measured against, and so without a budget.
 const SINGLE: &str = "_f32";
 /// The calls that must take the same for every pose, and how much they may spread in parts of the median.

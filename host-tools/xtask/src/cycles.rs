@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::{Value, json};
 
-use crate::counts::Counts;
+use crate::counts::{Counts, TOLERANCE};
 use crate::cross;
 use crate::errors::Errors;
 use crate::image::Image;
@@ -125,7 +125,10 @@ fn complaints(all: &[Measured], errors: &Errors) -> Result<Vec<String>> {
             ..
         } = measured;
         complaints.extend(counts.complaints(core.name, &budget[core.name]));
-        if let Some(ceiling) = core.ceiling.filter(|ceiling| flash.whole > *ceiling) {
+        if let Some(ceiling) = core
+            .ceiling
+            .filter(|ceiling| flash.whole as f64 > *ceiling as f64 * TOLERANCE)
+        {
             complaints.push(format!(
                 "the kernel takes {} bytes of flash on {}, ceiling {ceiling}",
                 flash.whole, core.name
