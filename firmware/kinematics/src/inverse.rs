@@ -40,7 +40,7 @@ impl Inverse {
 
 /// The platform of a pose.
 pub(crate) struct Platform {
-    /// C1 and C2 over √2 in Q30, each wrong by at most 3 parts in 10⁹.
+    /// C1 and C2 over √2 in Q30, each coordinate wrong by at most 9 parts in 10⁹.
     pub points: [Vector; 2],
     /// Its z axis, C1 × C2, in Q30.
     pub normal: Vector,
