@@ -98,46 +98,51 @@ struct Rooms {
 impl Rooms {
     /// Takes the rate and the way that braking at the end of the range takes.
     fn new(previous: &Pose, range: &Pose, step: Angle, period: Duration) -> Self {
-        let from = axes(previous);
-        let range = axes(range);
+        let (from, range) = (axes(previous), axes(range));
+        let room = |distance: Angle| step.min(braking_step(distance, period));
         Self {
             from,
-            down: [0, 1, 2].map(|k| step.min(braking_step(from[k] + range[k], period))),
-            up: [0, 1, 2].map(|k| step.min(braking_step(range[k] - from[k], period))),
+            down: each(from, range, |from, range| room(from + range)),
+            up: each(from, range, |from, range| room(range - from)),
         }
     }
 
     /// Returns the pose nearest to `to`, each axis by itself.
     fn bounded(&self, to: &Pose) -> Pose {
-        let to = axes(to);
-        pose([0, 1, 2].map(|k| {
-            let from = self.from[k];
-            to[k].bounded(from - self.down[k], from + self.up[k])
-        }))
+        let lowest = each(self.from, self.down, |from, down| from - down);
+        let highest = each(self.from, self.up, |from, up| from + up);
+        let raised = each(axes(to), lowest, Angle::max);
+        pose(each(raised, highest, Angle::min))
     }
 
     /// Returns as much of the straight way to `to` as all axes can go, halved so many times.
     fn scaled(&self, to: &Pose, halvings: u32) -> Pose {
-        let way = [0, 1, 2].map(|k| axes(to)[k] - self.from[k]);
+        let way = each(axes(to), self.from, |to, from| to - from);
+        let rooms = self.down.into_iter().zip(self.up);
         // The least of room / way, Q30.
         let mut share = 1i64 << 30;
-        for (k, way) in way.into_iter().enumerate() {
-            let room = if way < Angle::ZERO {
-                self.down[k]
-            } else {
-                self.up[k]
-            };
+        for (way, (down, up)) in way.into_iter().zip(rooms) {
+            let room = if way < Angle::ZERO { down } else { up };
             let (room, way) = (room.to_q29(), way.abs().to_q29());
             if way > room {
                 share = share.min(i64::from(quotient_q30(room, way)) - 2);
             }
         }
-        let share = share.max(0) >> halvings;
-        pose([0, 1, 2].map(|k| {
-            let part = (i64::from(way[k].to_q29()) * share) >> 30;
-            self.from[k] + Angle::from_q29(part as i32)
+        let share = share.max(0) >> (halvings & 31);
+        pose(each(self.from, way, |from, way| {
+            let part = (i64::from(way.to_q29()) * share) >> 30;
+            from + Angle::from_q29(part as i32)
         }))
     }
+}
+
+/// Returns what becomes of two angles of each axis.
+fn each(
+    [a, b, c]: [Angle; 3],
+    [d, e, f]: [Angle; 3],
+    make: impl Fn(Angle, Angle) -> Angle,
+) -> [Angle; 3] {
+    [make(a, d), make(b, e), make(c, f)]
 }
 
 /// Returns yaw, pitch and roll as a list.
