@@ -81,6 +81,8 @@ impl Drop for HostInterface {
 struct Guest {
     kernel: PathBuf,
     folder: PathBuf,
+    /// What is loaded before the C library where the processor's state is larger than the kernel knows.
+    preload: Option<PathBuf>,
 }
 
 impl Guest {
@@ -99,7 +101,12 @@ impl Guest {
             .join("vcan")
             .join(std::process::id().to_string());
         fs::create_dir_all(&folder)?;
-        let guest = Self { kernel, folder };
+        let preload = preload(&folder)?;
+        let guest = Self {
+            kernel,
+            folder,
+            preload,
+        };
         fs::write(guest.file("environment"), environment(variables))?;
         fs::write(guest.file("init"), guest.script(words)?)?;
         for name in ["stdout", "stderr"] {
@@ -160,7 +167,11 @@ impl Guest {
     /// Boots, shows what the command writes, and returns its exit status.
     fn run(&self) -> Result<u8> {
         let log = File::create(self.file("kernel.log"))?;
-        let mut kernel = Command::new(&self.kernel)
+        let mut kernel = Command::new(&self.kernel);
+        if let Some(library) = &self.preload {
+            kernel.env("LD_PRELOAD", library);
+        }
+        let mut kernel = kernel
             .args([
                 "mem=1G",
                 "root=/dev/root",
@@ -203,6 +214,23 @@ impl Guest {
             thread::sleep(Duration::from_millis(20));
         }
     }
+}
+
+/// Builds what User-mode Linux needs on a processor with AMX (see `xstate.c`); nothing elsewhere.
+fn preload(folder: &Path) -> Result<Option<PathBuf>> {
+    let processor = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    if !processor.split_whitespace().any(|flag| flag == "amx_tile") {
+        return Ok(None);
+    }
+    let compiler = process::find("cc").context(
+        "User-mode Linux needs a C compiler on this processor (AMX); Debian's package is gcc",
+    )?;
+    let (source, library) = (folder.join("xstate.c"), folder.join("xstate.so"));
+    fs::write(&source, include_str!("xstate.c"))?;
+    let mut build = command(compiler);
+    build.args(["-shared", "-fPIC", "-O1", "-o"]);
+    run_command(build.arg(&library).arg(&source))?;
+    Ok(Some(library))
 }
 
 /// Copies what has been added to a file since the last time.
