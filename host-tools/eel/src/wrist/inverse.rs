@@ -144,15 +144,18 @@ fn write_text(
         writeln!(out, "  fixed    none: {reason}")?;
     }
     if let Some(found) = nearest(place.pose, choice) {
+        let pose = unit.columns(&found.pose);
+        let pose: Vec<&str> = pose.split_whitespace().collect();
+        let obstacle = match found.obstacle {
+            "range" => "the range of the angles",
+            "singular" => "a singularity",
+            _ => "the reach of the legs",
+        };
         writeln!(
             out,
-            "  nearest  {}  at yaw, pitch, roll {} ({} is in the way)",
+            "  nearest  {}  at yaw, pitch, roll {} ({obstacle} is in the way)",
             unit.columns(&found.theta),
-            unit.columns(&found.pose)
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(", "),
-            found.obstacle,
+            pose.join(", "),
         )?;
     }
     writeln!(out, "  f64      {}", unit.columns(&place.theta))?;
