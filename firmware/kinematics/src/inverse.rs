@@ -8,8 +8,9 @@ use eel_units::{
     root_near, sin_cos_near,
 };
 
+use crate::direct::LEAST_ASSEMBLY_SQUARE;
 use crate::pose::{Joints, Pose, PoseError};
-use crate::reach::ROOMS;
+use crate::reach::{LEAST_MARGIN, ROOMS};
 use crate::vector::{Vector, dot, high, times_root_two, wide};
 use crate::wrist::{Pull, Wrist};
 
@@ -18,6 +19,15 @@ pub(crate) const LEAST_SQUARE: i32 = 1 << 23;
 
 /// The least assembly margin W2 in Q28: ¾, where home has √2. The direct kinematics has the same.
 pub(crate) const LEAST_ASSEMBLY: i32 = 3 << 26;
+
+// One limit, in the formats of both directions; and one margin, with half of its square.
+const _: () = assert!(wide(LEAST_ASSEMBLY, LEAST_ASSEMBLY) >> 30 == LEAST_ASSEMBLY_SQUARE as i64);
+const _: () = assert!(half_square(LEAST_MARGIN) == LEAST_SQUARE);
+
+/// Returns half of a margin's square in Q28, of a margin in Q30.
+const fn half_square(margin: i32) -> i32 {
+    high(wide(margin, margin)) >> 1
+}
 
 /// What the inverse kinematics gives for a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +54,14 @@ pub(crate) struct Platform {
     pub points: [Vector; 2],
     /// Its z axis, C1 × C2, in Q30.
     pub normal: Vector,
+}
+
+/// E, F, G of a leg in Q30, and D/2 = E² + F² − G² in Q60.
+struct Terms {
+    e: i32,
+    f: i32,
+    g: i32,
+    square: i64,
 }
 
 /// What one leg gives: tan(θ/2) in Q31, and √D over √2 in Q30.
@@ -91,9 +109,7 @@ impl Wrist {
             root: solved1.margin.min(solved2.margin),
         })
     }
-}
 
-impl Wrist {
     /// Returns how far a pose of the kernel's range is from what the inverse refuses, in Q28: each
     /// leg's D/2 above that of `margin`, each crank's and the third motor's way to its end, the
     /// assembly room. Continuous; all positive where the inverse answers with that margin.
@@ -102,25 +118,20 @@ impl Wrist {
             points: [first, second],
             normal,
         } = pose.platform();
-        let least = high(wide(margin, margin)) >> 1; // half of its square, Q28
+        let least = half_square(margin);
         let [one, other] = [
             self.legs[0].pull.room(&first, least),
             self.legs[1].pull.room(&second, least),
         ];
         let [x, y, _] = first;
-        let third = ((y + x) >> 1) + ((y + x) >> 5) - (y - x).abs();
-        let bent = Solved {
-            half_tangent: other.half_tangent,
-            square: quadruple_square(other.half_tangent),
-            margin: 0,
-        };
+        let third = end(y + x) - (y - x).abs();
         [
             one.square,
             other.square,
             one.turn,
             other.turn,
             third >> 2,
-            self.legs[1].pull.assembly_room(&normal, &bent),
+            self.legs[1].pull.assembly_room(&normal, &other.solved),
         ]
     }
 }
@@ -131,8 +142,8 @@ struct Room {
     square: i32,
     /// 17/32 (F + √D) − |G − E|, Q28.
     turn: i32,
-    /// tan(θ/2) in Q31, held within ±17/32.
-    half_tangent: i32,
+    /// The leg as if it were within them: tan(θ/2) held within ±17/32, √D at the kernel's least.
+    solved: Solved,
 }
 
 impl Pose {
@@ -179,12 +190,7 @@ impl Pull {
     /// Solves E cos θ + F sin θ = G for the platform's point C over √2 (Q30).
     #[inline(always)]
     fn solve(&self, point: &Vector) -> Result<Solved, PoseError> {
-        // All over 2ρ and √2. |E| ≤ 0.74, |F| ≤ 1.44, −0.9 ≤ G ≤ 2: within Q30.
-        let e = point[1] - self.center[0];
-        let f = point[2] - self.center[1];
-        let g = self.offset - (dot(point, &self.slope) >> 30) as i32;
-        // D/2 = E² + F² − G² in Q60.
-        let square = wide(e, e) + wide(f, f) + wide(g, -g);
+        let Terms { e, f, g, square } = self.terms(point);
         let top = high(square);
         if top < LEAST_SQUARE {
             return Err(if top < 0 {
@@ -203,26 +209,39 @@ impl Pull {
         })
     }
 
-    /// Returns how far the leg is from its limits, for any point of the kernel's range.
-    fn room(&self, point: &Vector, least: i32) -> Room {
+    /// Returns the terms of E cos θ + F sin θ = G, all over 2ρ and √2.
+    #[inline(always)]
+    fn terms(&self, point: &Vector) -> Terms {
+        // |E| ≤ 0.74, |F| ≤ 1.44, −0.9 ≤ G ≤ 2: within Q30.
         let e = point[1] - self.center[0];
         let f = point[2] - self.center[1];
         let g = self.offset - (dot(point, &self.slope) >> 30) as i32;
         let square = wide(e, e) + wide(f, f) + wide(g, -g);
+        Terms { e, f, g, square }
+    }
+
+    /// Returns how far the leg is from its limits, for any point of the kernel's range.
+    fn room(&self, point: &Vector, least: i32) -> Room {
+        let Terms { e, f, g, square } = self.terms(point);
         // Below the kernel's own margin as if it were that: continuous, and F + √D stays positive.
         let top = high(square);
-        let root = if top < LEAST_SQUARE {
+        let margin = if top < LEAST_SQUARE {
             root_near(LEAST_SQUARE << 3)
         } else {
             root_near((square >> 29) as i32)
         };
-        let below = f + root;
-        let end = (below >> 1) + (below >> 5);
+        let below = f + margin;
+        let end = end(below);
         let above = g.saturating_sub(e);
+        let half_tangent = ratio_q30(above.max(-end).min(end) << 1, below);
         Room {
             square: top - least,
             turn: (end >> 2) - (above.saturating_abs() >> 2),
-            half_tangent: ratio_q30(above.max(-end).min(end) << 1, below),
+            solved: Solved {
+                half_tangent,
+                square: quadruple_square(half_tangent),
+                margin,
+            },
         }
     }
 
@@ -240,10 +259,16 @@ impl Pull {
     }
 }
 
+/// Returns 17/32 of a divisor: where the arctangent's range ends.
+#[inline(always)]
+const fn end(divisor: i32) -> i32 {
+    (divisor >> 1) + (divisor >> 5)
+}
+
 /// Returns `number / divisor` in Q31 where it is within the arctangent's ±17/32.
 #[inline(always)]
 fn small_ratio(number: i32, divisor: i32) -> Option<i32> {
-    let reach = (divisor >> 1) + (divisor >> 5);
+    let reach = end(divisor);
     // The sum can pass 2³¹ (a unit at its tolerances, far out): as u32 it still is the sum.
     if number.wrapping_add(reach) as u32 >= (reach << 1) as u32 {
         return None;

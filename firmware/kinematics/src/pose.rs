@@ -39,6 +39,16 @@ impl Pose {
         roll: Angle::ZERO,
     };
 
+    /// Makes a pose of yaw, pitch and roll.
+    pub const fn from_angles([yaw, pitch, roll]: [Angle; 3]) -> Self {
+        Self { yaw, pitch, roll }
+    }
+
+    /// Returns yaw, pitch and roll.
+    pub const fn angles(&self) -> [Angle; 3] {
+        [self.yaw, self.pitch, self.roll]
+    }
+
     /// Returns the platform's angular velocity in the base frame for (yaw', pitch', roll').
     ///
     /// ω = yaw' eₓ + pitch' Rx e_y + roll' Rx Ry e_z; wrong by at most 5 parts in 10⁹ of the rates

@@ -39,7 +39,7 @@ const FARTHEST: i32 = 1 << 30;
 /// The kernel's own range in Q29, both ways: 1 rad of yaw, ½ rad of pitch and roll.
 const RANGE: Vector = [(1 << 29) - 1, (1 << 28) - 1, (1 << 28) - 1];
 /// The kernel's own least margin, Q30: ¼.
-const LEAST_MARGIN: i32 = 1 << 28;
+pub(crate) const LEAST_MARGIN: i32 = 1 << 28;
 
 /// Where the wrist may go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,11 +55,11 @@ impl Reach {
     pub const fn kernel() -> Self {
         let [yaw, pitch, roll] = RANGE;
         Self {
-            range: Pose {
-                yaw: Angle::from_q29(yaw),
-                pitch: Angle::from_q29(pitch),
-                roll: Angle::from_q29(roll),
-            },
+            range: Pose::from_angles([
+                Angle::from_q29(yaw),
+                Angle::from_q29(pitch),
+                Angle::from_q29(roll),
+            ]),
             margin: LEAST_MARGIN,
         }
     }
@@ -122,7 +122,7 @@ impl Wrist {
             Err(obstacle) => obstacle,
         };
         let range = reach.box_q29();
-        let wanted = target.to_array();
+        let wanted = to_q29(target);
         let boxed = [0, 1, 2].map(|axis| wanted[axis].max(-range[axis]).min(range[axis]));
         let mut pose = self.towards_home(&boxed, reach, COARSE);
         // The nearest place so far, and what it is on the way home from.
@@ -137,7 +137,7 @@ impl Wrist {
                 }
             }
         }
-        let found = Pose::from_array(self.towards_home(&source, reach, FINE));
+        let found = from_q29(self.towards_home(&source, reach, FINE));
         let inverse = self.inverse(&found)?;
         if inverse.margin() < reach.margin {
             return Err(PoseError::Singular);
@@ -151,8 +151,7 @@ impl Wrist {
 
     /// Returns the answer for a pose that is allowed, or what is in its way.
     fn allowed(&self, pose: &Pose, reach: &Reach) -> Result<Inverse, Obstacle> {
-        let inside = pose
-            .to_array()
+        let inside = to_q29(pose)
             .into_iter()
             .zip(reach.box_q29())
             .all(|(angle, range)| angle >= -range && angle <= range);
@@ -168,7 +167,7 @@ impl Wrist {
 
     /// Returns the point nearest to `wanted` that all planes at `pose` and the box allow.
     fn step(&self, pose: &[i32; 3], wanted: &[i32; 3], range: &[i32; 3], margin: i32) -> [i32; 3] {
-        let here = self.rooms(&Pose::from_array(*pose), margin);
+        let here = self.rooms(&from_q29(*pose), margin);
         let mut planes = [Plane::default(); ROOMS];
         for axis in 0..3 {
             // Inwards, so that the kernel's range is never left.
@@ -179,7 +178,7 @@ impl Wrist {
             };
             let mut moved = *pose;
             moved[axis] += aside;
-            let there = self.rooms(&Pose::from_array(moved), margin);
+            let there = self.rooms(&from_q29(moved), margin);
             for (plane, (there, here)) in planes.iter_mut().zip(there.into_iter().zip(here)) {
                 // Q28 over 2⁻⁹ is Q28 << 9: Q14 is that >> 14.
                 let slope = saturate((i64::from(there) - i64::from(here)) >> 5);
@@ -200,7 +199,7 @@ impl Wrist {
 
     /// Returns the pose, or where on the way home it becomes an allowed one, to 2⁻ʰ of the way.
     fn towards_home(&self, pose: &[i32; 3], reach: &Reach, halvings: u32) -> [i32; 3] {
-        if self.allowed(&Pose::from_array(*pose), reach).is_ok() {
+        if self.allowed(&from_q29(*pose), reach).is_ok() {
             return *pose;
         }
         // Parts of the way in 2⁻ʰ: `good` is allowed.
@@ -208,7 +207,7 @@ impl Wrist {
         let part = |share: i32| pose.map(|angle| (wide(angle, share) >> (halvings & 31)) as i32);
         for _ in 0..halvings {
             let middle = (good + bad) >> 1;
-            if self.allowed(&Pose::from_array(part(middle)), reach).is_ok() {
+            if self.allowed(&from_q29(part(middle)), reach).is_ok() {
                 good = middle;
             } else {
                 bad = middle;
@@ -221,25 +220,19 @@ impl Wrist {
 impl Reach {
     /// Returns the box within the kernel's own, Q29.
     fn box_q29(&self) -> [i32; 3] {
-        let asked = self.range.to_array();
+        let asked = to_q29(&self.range);
         [0, 1, 2].map(|axis| asked[axis].clamp(0, RANGE[axis]))
     }
 }
 
-impl Pose {
-    /// Returns yaw, pitch and roll in Q29.
-    pub(crate) const fn to_array(self) -> [i32; 3] {
-        [self.yaw.to_q29(), self.pitch.to_q29(), self.roll.to_q29()]
-    }
+/// Returns yaw, pitch and roll in Q29.
+fn to_q29(pose: &Pose) -> Vector {
+    pose.angles().map(Angle::to_q29)
+}
 
-    /// Makes a pose of yaw, pitch and roll in Q29.
-    pub(crate) const fn from_array([yaw, pitch, roll]: [i32; 3]) -> Self {
-        Self {
-            yaw: Angle::from_q29(yaw),
-            pitch: Angle::from_q29(pitch),
-            roll: Angle::from_q29(roll),
-        }
-    }
+/// Makes a pose of yaw, pitch and roll in Q29.
+fn from_q29(angles: Vector) -> Pose {
+    Pose::from_angles(angles.map(Angle::from_q29))
 }
 
 /// Returns the square of the distance between two points of Q29, Q48.

@@ -76,15 +76,16 @@ pub fn admit(
     }
     // Each axis by itself leads out of what the legs reach: straight, then along the edge, then less.
     limited |= Limited::KINEMATICS;
+    let is_way = |pose: &Pose| *pose != previous && wrist.inverse(pose).is_ok();
+    let straight = rooms.scaled(&boxed, 0);
+    if is_way(&straight) {
+        return (straight, Limited(limited));
+    }
     let along = wrist
         .nearest(&step, &reach)
         .map_or(previous, |nearest| rooms.scaled(&nearest.pose, 0));
-    let ways = [rooms.scaled(&boxed, 0), along];
-    let shorter = [1, 2, 3, 4].map(|halvings| rooms.scaled(&along, halvings));
-    let allowed = ways
-        .into_iter()
-        .chain(shorter)
-        .find(|pose| *pose != previous && wrist.inverse(pose).is_ok());
+    let shorter = [0, 1, 2, 3, 4].map(|halvings| rooms.scaled(&along, halvings));
+    let allowed = shorter.into_iter().find(is_way);
     (allowed.unwrap_or(previous), Limited(limited))
 }
 
@@ -98,7 +99,7 @@ struct Rooms {
 impl Rooms {
     /// Takes the rate and the way that braking at the end of the range takes.
     fn new(previous: &Pose, range: &Pose, step: Angle, period: Duration) -> Self {
-        let (from, range) = (axes(previous), axes(range));
+        let (from, range) = (previous.angles(), range.angles());
         let room = |distance: Angle| step.min(braking_step(distance, period));
         Self {
             from,
@@ -111,13 +112,13 @@ impl Rooms {
     fn bounded(&self, to: &Pose) -> Pose {
         let lowest = each(self.from, self.down, |from, down| from - down);
         let highest = each(self.from, self.up, |from, up| from + up);
-        let raised = each(axes(to), lowest, Angle::max);
-        pose(each(raised, highest, Angle::min))
+        let raised = each(to.angles(), lowest, Angle::max);
+        Pose::from_angles(each(raised, highest, Angle::min))
     }
 
     /// Returns as much of the straight way to `to` as all axes can go, halved so many times.
     fn scaled(&self, to: &Pose, halvings: u32) -> Pose {
-        let way = each(axes(to), self.from, |to, from| to - from);
+        let way = each(to.angles(), self.from, |to, from| to - from);
         let rooms = self.down.into_iter().zip(self.up);
         // The least of room / way, Q30.
         let mut share = 1i64 << 30;
@@ -129,7 +130,7 @@ impl Rooms {
             }
         }
         let share = share.max(0) >> (halvings & 31);
-        pose(each(self.from, way, |from, way| {
+        Pose::from_angles(each(self.from, way, |from, way| {
             let part = (i64::from(way.to_q29()) * share) >> 30;
             from + Angle::from_q29(part as i32)
         }))
@@ -143,16 +144,6 @@ fn each(
     make: impl Fn(Angle, Angle) -> Angle,
 ) -> [Angle; 3] {
     [make(a, d), make(b, e), make(c, f)]
-}
-
-/// Returns yaw, pitch and roll as a list.
-const fn axes(pose: &Pose) -> [Angle; 3] {
-    [pose.yaw, pose.pitch, pose.roll]
-}
-
-/// Makes a pose of yaw, pitch and roll.
-const fn pose([yaw, pitch, roll]: [Angle; 3]) -> Pose {
-    Pose { yaw, pitch, roll }
 }
 
 /// Tells whether a pose is inside the workspace widened by a quarter; the hard stops are inside that.
@@ -244,15 +235,15 @@ mod tests {
     /// A box of which the legs do not reach the corners.
     fn wide_settings(scale: f64) -> Settings {
         let mut settings = settings();
-        let range = axes(&settings.limits.workspace);
+        let range = settings.limits.workspace.angles();
         let wider = range.map(|end| Angle::from_q29((f64::from(end.to_q29()) * scale) as i32));
-        settings.limits.workspace = pose(wider);
+        settings.limits.workspace = Pose::from_angles(wider);
         settings
     }
 
     fn distance(one: &Pose, other: &Pose) -> f64 {
         let apart = [0, 1, 2].map(|k| {
-            let difference = axes(one)[k] - axes(other)[k];
+            let difference = one.angles()[k] - other.angles()[k];
             f64::from(difference.to_q29()) / f64::from(1 << 29)
         });
         apart.iter().map(|part| part * part).sum::<f64>().sqrt()
@@ -274,16 +265,18 @@ mod tests {
                 range: limits.workspace,
                 ..Reach::kernel()
             };
-            let corner = axes(&limits.workspace);
+            let corner = limits.workspace.angles();
             let mut somewhere = || {
-                pose(corner.map(|end| Angle::from_q29((f64::from(end.to_q29()) * random()) as i32)))
+                Pose::from_angles(
+                    corner.map(|end| Angle::from_q29((f64::from(end.to_q29()) * random()) as i32)),
+                )
             };
             let start = wrist
                 .nearest(&somewhere(), &reach)
                 .expect("home is allowed")
                 .pose;
             let target = if round % 2 == 0 {
-                pose([0, 1, 2].map(|k| {
+                Pose::from_angles([0, 1, 2].map(|k| {
                     if round >> (k + 1) & 1 == 0 {
                         corner[k]
                     } else {
@@ -302,7 +295,7 @@ mod tests {
                 let (next, _) = admit(target, at, PERIOD, &limits, &wrist);
                 assert!(wrist.inverse(&next).is_ok());
                 let step = largest_step(limits.rate, PERIOD);
-                for (one, other) in axes(&next).into_iter().zip(axes(&at)) {
+                for (one, other) in next.angles().into_iter().zip(at.angles()) {
                     assert!((one - other).abs() <= step);
                 }
                 at = next;
