@@ -27,8 +27,9 @@ struct Answer {
     solutions: Vec<Solution>,
 }
 
+/// A platform's angles, the paper's and ours, and det A there.
 #[derive(Clone, Copy, Serialize)]
-struct Platform {
+pub struct Platform {
     phi: f64,
     psi: f64,
     yaw: f64,
@@ -46,7 +47,7 @@ struct Solution {
 
 impl Platform {
     /// Returns the angles in rad of an orientation that motor 3 turned by a known angle.
-    fn of(rotation: &Matrix3<f64>, theta3: f64, det_a: f64) -> Self {
+    pub fn of(rotation: &Matrix3<f64>, theta3: f64, det_a: f64) -> Self {
         let [phi, psi] = phi_psi(rotation, theta3);
         let [yaw, pitch, roll] = design::pose(rotation);
         Self {
@@ -63,7 +64,8 @@ impl Platform {
         [self.phi, self.psi, self.yaw, self.pitch, self.roll]
     }
 
-    fn in_unit(&self, unit: Unit) -> Self {
+    /// Returns the same with angles in a unit.
+    pub fn in_unit(&self, unit: Unit) -> Self {
         let [phi, psi, yaw, pitch, roll] = unit.show(self.angles());
         Self {
             phi,

@@ -14,7 +14,7 @@ use eel_kinematics::design::{self, AssemblyMode, Geometry, Matrix3, WorkingMode}
 use serde::Serialize;
 
 use super::args::{Architecture, Draw, Figure};
-use super::direct::{is_joined, no_platform, phi_psi};
+use super::direct::{Platform, is_joined, no_platform, phi_psi};
 use super::number::{Unit, signed};
 use super::place::Place;
 use super::{check_out, deliver, refused};
@@ -53,12 +53,8 @@ struct PanelAnswer {
     working_mode: Option<&'static str>,
     assembly_mode: Option<&'static str>,
     theta: [f64; 3],
-    phi: f64,
-    psi: f64,
-    yaw: f64,
-    pitch: f64,
-    roll: f64,
-    det_a: f64,
+    #[serde(flatten)]
+    platform: Platform,
     points: PointsAnswer,
 }
 
@@ -275,9 +271,8 @@ impl Configuration {
 fn write_json(out: &mut dyn Write, drawing: &Drawing, unit: Unit) -> Result<()> {
     let panels = drawing.configurations.iter().map(|one| {
         let geometry = one.geometry();
-        let [phi, psi] = phi_psi(&one.rotation, one.theta[2]);
-        let [phi, psi] = unit.show([phi, psi]);
-        let [yaw, pitch, roll] = unit.show(design::pose(&one.rotation));
+        let det_a = geometry.jacobians(&one.rotation, &one.theta).det_a();
+        let platform = Platform::of(&one.rotation, one.theta[2], det_a);
         let points = Points::of(&geometry, &one.rotation, &one.theta);
         let working = geometry.working_mode(&one.rotation, &one.theta);
         let assembly = geometry.assembly_mode(&one.rotation, &one.theta);
@@ -286,12 +281,7 @@ fn write_json(out: &mut dyn Write, drawing: &Drawing, unit: Unit) -> Result<()> 
             working_mode: working.map(WorkingMode::name),
             assembly_mode: assembly.map(AssemblyMode::name),
             theta: unit.show(one.theta),
-            phi,
-            psi,
-            yaw,
-            pitch,
-            roll,
-            det_a: geometry.jacobians(&one.rotation, &one.theta).det_a(),
+            platform: platform.in_unit(unit),
             points: PointsAnswer {
                 a: points.a.map(Into::into),
                 b: points.b.map(Into::into),
