@@ -78,6 +78,8 @@ pub enum Access {
 pub struct Entry {
     /// Its length in bytes; 0 where the length varies.
     pub length: u8,
+    /// Whether it is a domain, which streams and is never held whole in memory; `length` is then 0.
+    pub domain: bool,
     /// Who may read and write it.
     pub access: Access,
     /// Whether a TPDO may carry it.
@@ -87,6 +89,9 @@ pub struct Entry {
 }
 
 /// The objects outside 0x1000–0x1FFF, and what happens around a PDO.
+///
+/// The EDS (0x1021 and 0x1022) and what belongs to programs (0x1F50–0x1F5F) are the application's too.
+/// A domain is read or written by one SDO transfer at a time, in order and without gaps.
 pub trait Application {
     /// Describes an object.
     ///
@@ -119,4 +124,72 @@ pub trait Application {
     /// Hears that TPDO `number` (1–4) is about to be read and sent as `cob_id`, so that its
     /// objects can be brought up to date.
     fn tpdo_due(&mut self, number: u8, cob_id: u16);
+
+    /// Opens a domain to be read from its start and returns its length in bytes. What is then read
+    /// does not change until it is opened again.
+    ///
+    /// # Errors
+    /// The abort code to answer with.
+    fn open_domain(&mut self, index: u16, subindex: u8) -> Result<u32, Abort> {
+        let _ = (index, subindex);
+        Err(Abort::NoData)
+    }
+
+    /// Copies the open domain's bytes from `offset` on to `out` and returns how many: as many as
+    /// fit, and fewer only at the end. Each call goes on where the one before ended.
+    ///
+    /// # Errors
+    /// The abort code that ends the transfer.
+    fn read_domain(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        offset: u32,
+        out: &mut [u8],
+    ) -> Result<usize, Abort> {
+        let _ = (index, subindex, offset, out);
+        Err(Abort::NoData)
+    }
+
+    /// Begins to write a domain, of `length` bytes where the client said so.
+    ///
+    /// # Errors
+    /// The abort code to answer with.
+    fn begin_domain(&mut self, index: u16, subindex: u8, length: Option<u32>) -> Result<(), Abort> {
+        let _ = (index, subindex, length);
+        Err(Abort::ReadOnly)
+    }
+
+    /// Takes the next bytes of the domain that is being written; `offset` is how many came before.
+    ///
+    /// # Errors
+    /// The abort code that ends the transfer.
+    fn write_domain(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        offset: u32,
+        data: &[u8],
+    ) -> Result<(), Abort> {
+        let _ = (index, subindex, offset, data);
+        Err(Abort::ReadOnly)
+    }
+
+    /// Ends the writing of a domain: `length` bytes have come and every check of the transfer held,
+    /// or `None`: it was broken off, and what came is void.
+    ///
+    /// # Errors
+    /// The abort code to answer a complete transfer with.
+    fn end_domain(&mut self, index: u16, subindex: u8, length: Option<u32>) -> Result<(), Abort> {
+        let _ = (index, subindex, length);
+        Ok(())
+    }
+
+    /// Tells whether parameters may be stored or restored now (0x1010, 0x1011, LSS).
+    ///
+    /// # Errors
+    /// The abort code to answer with, such as [`Abort::DeviceState`].
+    fn may_store(&self) -> Result<(), Abort> {
+        Ok(())
+    }
 }

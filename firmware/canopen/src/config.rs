@@ -21,8 +21,10 @@ pub struct Identity {
 /// Everything that a node starts with, and returns to when its communication is reset.
 #[derive(Clone, Copy, Debug)]
 pub struct Config {
-    /// The node id, 1–127. With any other the node is unconfigured: silent and deaf.
+    /// The node id, 1–127. With any other the node is unconfigured: it only listens to LSS.
     pub node_id: u8,
+    /// The lowest and the highest node id that LSS may give.
+    pub node_ids: (u8, u8),
     /// Object 0x1018.
     pub identity: Identity,
     /// Object 0x1000.
@@ -42,6 +44,11 @@ pub struct Config {
     pub sync_cob_id: u16,
     /// Object 0x1019: the highest SYNC counter, 2–240; 0 when SYNC carries no counter.
     pub sync_counter_overflow: u8,
+    /// Object 0x1012: the identifier of TIME, 0x100 by the predefined connection set.
+    pub time_cob_id: u16,
+    /// Object 0x1029, subindex 1: what the node does in Operational when its communication fails:
+    /// 0 enters Pre-operational, 1 stays, 2 enters Stopped.
+    pub error_behaviour: u8,
     /// Objects 0x1400 and 0x1600 onwards; what comes after the fourth is ignored.
     pub rpdos: &'static [PdoDefault],
     /// Objects 0x1800 and 0x1A00 onwards; what comes after the fourth is ignored.

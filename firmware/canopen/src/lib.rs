@@ -18,6 +18,7 @@
 //! let mut node = Node::new(
 //!     Config {
 //!         node_id: 5,
+//!         node_ids: (1, 127),
 //!         identity,
 //!         device_type: 0,
 //!         device_name: "example",
@@ -27,9 +28,13 @@
 //!         consumer: Some((127, 300)),
 //!         sync_cob_id: 0x080,
 //!         sync_counter_overflow: 0,
+//!         time_cob_id: 0x100,
+//!         error_behaviour: 0,
 //!         rpdos: &[],
 //!         tpdos: &[],
 //!     },
+//!     &[],
+//!     &application,
 //!     0,
 //! );
 //! let boot_up = node.poll_transmit();
@@ -72,9 +77,12 @@ mod transmit;
 pub use application::{Abort, Access, Application, Entry};
 pub use config::{Config, Identity, Mapped, PDOS, PdoDefault};
 pub use emergency::{REGISTER_COMMUNICATION, REGISTER_GENERIC};
-pub use event::Event;
+pub use event::{Event, Group, StoreRequest};
 pub use frame::{Frame, Id};
 pub use nmt::{NmtCommand, NmtState};
 pub use node::{Counters, Node};
 pub use queue::EventQueue;
 pub use sdo::SDO_BUFFER;
+
+/// The most bytes that the stored parameters of a communication area take.
+pub const STORED_PARAMETERS: usize = 400;

@@ -6,7 +6,7 @@ use crate::objects::Objects;
 use crate::pdo::Received;
 use crate::sdo::Server;
 use crate::transmit::TransmitQueue;
-use crate::{Application, Config, Event, EventQueue, Frame, Mapped, NmtCommand, NmtState};
+use crate::{Abort, Application, Config, Event, EventQueue, Frame, Mapped, NmtCommand, NmtState};
 
 /// How many events wait to be polled.
 const EVENTS: usize = 16;
@@ -50,8 +50,12 @@ pub struct Node {
 impl Node {
     /// Makes a node that is Pre-operational and whose boot-up message waits to be sent.
     ///
-    /// With a node id outside 1–127 it is unconfigured: it stays `Initialising`, silent and deaf.
-    pub fn new(config: Config, now_us: u64) -> Self {
+    /// `stored` is what [`save_parameters`](Self::save_parameters) once wrote, or nothing. Parameters that
+    /// this node can't have are left out, all of them: see [`has_refused_stored`](Self::has_refused_stored).
+    /// With a node id outside 1–127 the node is unconfigured: it stays `Initialising` and only
+    /// listens to LSS.
+    pub fn new(config: Config, stored: &[u8], app: &impl Application, now_us: u64) -> Self {
+        let _ = (stored, app);
         let mut node = Self {
             config,
             state: NmtState::Initialising,
@@ -188,6 +192,18 @@ impl Node {
     pub fn emergency_cleared(&mut self, now_us: u64, register_bits: u8) {
         self.communication.emergency.clear(register_bits);
         self.send_emergencies(now_us);
+    }
+
+    /// Writes the parameters of the communication area to the start of `out` and returns how many
+    /// bytes they take, at most [`STORED_PARAMETERS`](crate::STORED_PARAMETERS); 0 when `out` is too short.
+    pub fn save_parameters(&self, out: &mut [u8]) -> usize {
+        let _ = out;
+        0
+    }
+
+    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not.
+    pub fn finish_store(&mut self, now_us: u64, outcome: Result<(), Abort>) {
+        let _ = (now_us, outcome);
     }
 
     /// Asks for one transmission of TPDO `number` (1–4): type 0 sends it at the next SYNC, types

@@ -54,6 +54,7 @@ impl<A: Application> Objects<'_, A> {
                 let tpdo = index == 0x1001;
                 Ok(Entry {
                     length,
+                    domain: false,
                     access: access(index, subindex),
                     tpdo,
                     rpdo: false,

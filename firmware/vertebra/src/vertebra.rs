@@ -3,7 +3,7 @@
 use eel_canopen::{Config, Frame, Identity, NmtCommand, NmtState, Node};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
-use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status};
+use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status, VERTEBRAE};
 use eel_protocol::{SYNC_COUNTER_OVERFLOW, VERTEBRA_HEARTBEAT_MS, identity, pdo};
 use eel_units::{Angle, Duration, Instant};
 
@@ -43,10 +43,10 @@ pub fn turn(
 impl Vertebra {
     /// Starts a vertebra at power-up: drives off, boot-up message waiting.
     pub fn new(settings: Settings, now: Instant) -> Self {
-        let node = Node::new(config(&settings), now.to_micros());
+        let core = Core::new(settings, now);
         Self {
-            node,
-            core: Core::new(settings, now),
+            node: Node::new(config(&settings), &[], &core, now.to_micros()),
+            core,
             settings,
         }
     }
@@ -197,6 +197,7 @@ impl Vertebra {
 fn config(settings: &Settings) -> Config {
     Config {
         node_id: settings.node.get(),
+        node_ids: (NodeId::FIRST.get(), VERTEBRAE),
         identity: Identity {
             vendor: identity::VENDOR,
             product: identity::PRODUCT,
@@ -211,6 +212,9 @@ fn config(settings: &Settings) -> Config {
         consumer: Some((HEAD_NODE, HEAD_HEARTBEAT_TIMEOUT_MS)),
         sync_cob_id: 0x080,
         sync_counter_overflow: SYNC_COUNTER_OVERFLOW,
+        time_cob_id: 0x100,
+        // The vertebra lets go by itself, and goes on telling how it is.
+        error_behaviour: 1,
         rpdos: pdo::RPDOS,
         tpdos: pdo::TPDOS,
     }

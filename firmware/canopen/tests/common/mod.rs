@@ -28,6 +28,7 @@ const EFFORT: &[Mapped] = &[Mapped::new(0x2010, 1, 16)];
 /// Two RPDOs (SYNC, event) and three TPDOs (every SYNC, every second, event).
 pub const CONFIG: Config = Config {
     node_id: ID,
+    node_ids: (1, 127),
     identity: Identity {
         vendor: 0x1234_5678,
         product: 0x0000_0EE1,
@@ -42,6 +43,8 @@ pub const CONFIG: Config = Config {
     consumer: Some((MASTER, 300)),
     sync_cob_id: 0x080,
     sync_counter_overflow: 0,
+    time_cob_id: 0x100,
+    error_behaviour: 1,
     rpdos: &[
         PdoDefault {
             cob_id_base: 0x200,
@@ -139,6 +142,7 @@ impl Application for Store {
         };
         Ok(Entry {
             length,
+            domain: false,
             access,
             tpdo,
             rpdo,
@@ -213,9 +217,10 @@ pub type Sent = (u16, Vec<u8>);
 impl Bench {
     /// A node as it is after power-on, its boot-up message not yet polled.
     pub fn with(config: Config) -> Self {
+        let app = Store::new();
         Self {
-            node: Node::new(config, 0),
-            app: Store::new(),
+            node: Node::new(config, &[], &app, 0),
+            app,
             now_us: 0,
         }
     }

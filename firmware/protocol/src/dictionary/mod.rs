@@ -180,6 +180,7 @@ impl Sub {
     pub const fn entry(&self) -> Entry {
         Entry {
             length: self.data_type.length(),
+            domain: false,
             access: self.access,
             tpdo: matches!(self.pdo, Pdo::Transmit),
             rpdo: matches!(self.pdo, Pdo::Receive),
@@ -265,6 +266,7 @@ pub fn entry(index: u16, subindex: u8) -> Result<Entry, Abort> {
         object(index).ok_or(Abort::NoObject)?;
         return Ok(Entry {
             length: 1,
+            domain: false,
             access: Access::Constant,
             tpdo: false,
             rpdo: false,
