@@ -107,6 +107,9 @@ impl Client {
             self.wait(1);
         }
         self.inbox.clear();
+        // No frame stays on the line for longer than a client waits.
+        self.up.late = None;
+        self.down.late = None;
     }
 
     fn download_blocks(
@@ -288,6 +291,10 @@ fn run(noise: Noise, seed: u64, always_crc: bool) -> (u32, u32) {
                 result.map(|received| assert!(received == expected, "{number}: {object:X?}"))
             }
         };
+        match result {
+            Ok(()) => well += 1,
+            Err(Failed) => client.give_up(object.0, object.1),
+        }
         // Whatever the client believes, what the server took over is what was sent.
         if kind < 3 {
             let complete =
@@ -303,10 +310,6 @@ fn run(noise: Noise, seed: u64, always_crc: bool) -> (u32, u32) {
             if object == (VALUE, 0) && (written || result.is_ok()) {
                 assert!(client.line.app.value == bytes, "{number}");
             }
-        }
-        match result {
-            Ok(()) => well += 1,
-            Err(Failed) => client.give_up(object.0, object.1),
         }
     }
     (well, client.segments_again)
