@@ -51,9 +51,9 @@
 //!
 //! Served: NMT, heartbeats sent and watched (0x1016, 0x1017), SYNC with counter (0x1005, 0x1019),
 //! four RPDOs and four TPDOs with mapping at run time, inhibit and event times, emergencies
-//! (0x1001, 0x1003, 0x1014, 0x1015), one SDO server, expedited, segmented and in
-//! blocks with CRC, for values of up to 889 bytes and for domains of any length. Deliberately absent:
-//! remote frames and node guarding, identifiers of 29 bits, single bits in PDOs.
+//! (0x1001, 0x1003, 0x1014, 0x1015), one SDO server, expedited, segmented and in blocks with CRC, for
+//! values of up to 889 bytes and for domains of any length, behind every other frame. Deliberately
+//! absent: remote frames and node guarding, identifiers of 29 bits, single bits in PDOs.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]

@@ -74,12 +74,16 @@ impl TransmitQueue {
     /// heartbeat, at most.
     #[inline(never)] // One copy in flash.
     pub fn keep_only(&mut self, cob_id: u16) {
-        let mut kept = self.frames.iter().filter_map(|frame| match frame.data() {
-            &[state] if frame.cob_id() == Some(cob_id) => Some(state),
-            _ => None,
-        });
-        let kept = [kept.next(), kept.next()];
-        self.clear();
+        let mut kept = [None; 2];
+        while let Some(frame) = self.frames.pop_front() {
+            if let &[state] = frame.data()
+                && frame.cob_id() == Some(cob_id)
+            {
+                let [_, before] = kept;
+                kept = [before, Some(state)];
+            }
+        }
+        self.sdo.clear();
         for state in kept.into_iter().flatten() {
             self.push(cob_id, &[state]);
         }
