@@ -60,7 +60,10 @@ fn a_client_without_crc_gets_none_and_gives_none() {
     assert_eq!(line.sdo([0xD5, 0xAB, 0xCD, 0, 0, 0, 0, 0]), DONE);
     assert_eq!(line.app.value, b"123456789");
 
-    line.sdo([0xA0, 0x20, 0x20, 0, 127, 0, 0, 0]);
+    assert_eq!(
+        line.sdo([0xA0, 0x20, 0x20, 0, 127, 0, 0, 0]),
+        [0xC2, 0x20, 0x20, 0, 9, 0, 0, 0]
+    );
     line.tell(START);
     line.stream();
     assert_eq!(line.sdo(acknowledge(2, 127)), [0xD5, 0, 0, 0, 0, 0, 0, 0]);

@@ -273,7 +273,8 @@ impl Server {
         }
         upload.use_blocks(size, command & 4 != 0);
         self.transfer = Transfer::Upload(upload);
-        self.say(0xC6, length.to_le_bytes());
+        // A CRC is offered to those who ask for one: others would check one that is not there.
+        self.say(0xC2 | command & 4, length.to_le_bytes());
         Ok(())
     }
 
