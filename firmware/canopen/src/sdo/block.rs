@@ -73,8 +73,9 @@ impl Block {
         self.failure = Some(abort);
     }
 
-    /// Looks at a segment: when it is the next one it is held back, and the one before is returned.
-    pub fn accept(&mut self, first: u8, data: [u8; SEGMENT]) -> Option<Option<[u8; SEGMENT]>> {
+    /// Looks at a segment: when it is the next one it is held back, and the one before, if there is
+    /// one, is returned: all of its bytes count.
+    pub fn accept(&mut self, first: u8, data: [u8; SEGMENT]) -> Option<[u8; SEGMENT]> {
         let sequence = first & 0x7F;
         if self.failure.is_some() {
             return None;
@@ -95,7 +96,7 @@ impl Block {
         }
         self.good = sequence;
         self.at_end = first & 0x80 != 0;
-        Some(self.held.replace(data))
+        self.held.replace(data)
     }
 
     /// Counts a segment as heard, and ends the block where that was the last.

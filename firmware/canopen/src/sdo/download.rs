@@ -98,8 +98,7 @@ impl Download {
         self.block.as_ref().is_some_and(Block::is_running)
     }
 
-    /// Takes a segment of a block: seven bytes, and whether the client says that it is the last.
-    /// What is wrong is remembered by the block.
+    /// Takes a segment of a block. What is wrong with it is remembered by the block.
     pub fn block_segment<A: Application>(
         &mut self,
         request: Message,
@@ -107,13 +106,9 @@ impl Download {
         objects: &mut Objects<'_, A>,
     ) {
         let [first, data @ ..] = request;
-        let Some(block) = &mut self.block else { return };
-        let Some(before) = block.accept(first, data) else {
-            return;
-        };
-        // The one before is known to be full now.
-        if let Some(held) = before
-            && let Err(abort) = self.take(&held, buffer, objects)
+        let before = self.block.as_mut().and_then(|b| b.accept(first, data));
+        if let Some(before) = before
+            && let Err(abort) = self.take(&before, buffer, objects)
             && let Some(block) = &mut self.block
         {
             block.fail(abort);

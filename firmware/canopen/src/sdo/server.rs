@@ -27,6 +27,7 @@ pub(crate) struct Server {
     object: Multiplexor,
     /// The domain that was begun and has not been ended.
     begun: Option<Multiplexor>,
+    /// When the client has been silent for too long.
     deadline_us: u64,
     /// What is to be said in return.
     answer: Option<Message>,
