@@ -86,6 +86,29 @@ fn a_client_that_is_only_slow_is_not_taken_for_one_that_has_lost_something() {
 }
 
 #[test]
+fn a_block_may_take_long_while_it_goes_on() {
+    let mut line = Line::new();
+    let bytes = pattern(127 * 7 + 140);
+    line.sdo(about(0xC6, DOMAIN, 1, bytes.len() as u32));
+    for segment in &segments(&bytes)[..127] {
+        line.ask(*segment);
+    }
+    // The first of the next block is lost; the other nineteen take almost three seconds.
+    let rest = segments(&bytes[889..]);
+    for segment in &rest[1..19] {
+        assert_eq!(line.pass_ms(150), [[0; 8]; 0]);
+        line.tell(*segment);
+    }
+    assert_eq!(line.sdo(rest[19]), acknowledge(0, 127));
+    for segment in &rest[..19] {
+        line.tell(*segment);
+    }
+    assert_eq!(line.sdo(rest[19]), acknowledge(20, 127));
+    assert_eq!(line.sdo(end(&bytes)), DONE);
+    assert_eq!(line.app.domain, bytes);
+}
+
+#[test]
 fn blocks_that_bring_nothing_come_to_an_end() {
     let mut line = Line::new();
     line.sdo(about(0xC6, DOMAIN, 1, 2_000));
