@@ -70,11 +70,7 @@ pub struct Node {
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
     /// The SDO client, which gets this answer once it is done and never later than `deadline_us`.
-    Sdo {
-        answer: [u8; 8],
-        object: [u8; 3],
-        deadline_us: u64,
-    },
+    Sdo { answer: [u8; 8], deadline_us: u64 },
     /// The LSS master.
     Lss,
 }
@@ -148,10 +144,12 @@ impl Node {
                 self.receive(cob_id, data, app);
             }
         }
+        self.sdo.settle(app);
         self.send_emergencies(now_us);
     }
 
-    /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs.
+    /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs, and at most eight
+    /// segments of an SDO block upload.
     pub fn tick(&mut self, now_us: u64, app: &mut impl Application) {
         if self.state == NmtState::Initialising {
             return;
@@ -170,10 +168,12 @@ impl Node {
             }
         }
         self.send_emergencies(now_us);
+        self.stream(now_us, app);
+        self.sdo.settle(app);
     }
 
     /// Returns the time at which [`tick`](Self::tick) has something to do; `None` when only a
-    /// frame can give the node work.
+    /// frame can give the node work. It is past while segments of an SDO block upload find room.
     pub fn next_deadline_us(&self) -> Option<u64> {
         if self.state == NmtState::Initialising {
             return None;
@@ -181,6 +181,9 @@ impl Node {
         let mut deadline = earlier(self.communication.deadline_us(), self.sdo.deadline_us());
         if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting {
             deadline = earlier(deadline, Some(deadline_us));
+        }
+        if self.sdo.has_segment() && self.transmit.has_sdo_room() {
+            deadline = Some(0);
         }
         if self.state != NmtState::Stopped {
             deadline = earlier(deadline, self.communication.emergency.deadline_us());
@@ -196,9 +199,10 @@ impl Node {
     /// Takes the next frame to send.
     ///
     /// At most 16 wait. One that finds the queue full is dropped and counted
-    /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced.
+    /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced. Eight
+    /// more of the SDO server wait until there is no other.
     pub fn poll_transmit(&mut self) -> Option<Frame> {
-        self.transmit.pop()
+        self.transmit.pop(sdo_cob_id(self.config.node_id))
     }
 
     /// Takes the next event. At most 16 wait; the oldest are displaced and counted.
@@ -313,7 +317,9 @@ impl Node {
                 .raise_fault(Fault::Heartbeat, node);
             self.behave_after_error(now_us);
         }
+        let streaming = self.sdo.is_streaming();
         if let Some(message) = self.sdo.expire(now_us) {
+            self.withdraw(streaming);
             self.answer(message);
         }
         self.expire_store(now_us);
@@ -352,18 +358,51 @@ impl Node {
             storing,
         };
         let was_asked = objects.storing.is_some();
+        let streaming = sdo.is_streaming();
         let answer = sdo.request(request, &mut objects);
         let is_asked = objects.storing.is_some() && !was_asked;
+        self.withdraw(streaming);
         match answer {
-            Some(answer) if is_asked => self.wait_for_store(now_us, request, answer),
+            Some(answer) if is_asked => self.wait_for_store(now_us, answer),
             Some(answer) => self.answer(answer),
             None => {}
         }
     }
 
     fn answer(&mut self, message: [u8; 8]) {
-        self.transmit
-            .push(0x580 + u16::from(self.config.node_id), &message);
+        self.transmit.push_sdo(message);
+    }
+
+    /// Takes back segments of an upload that have not been sent: after what just came the client
+    /// would take them for something else.
+    fn withdraw(&mut self, streaming: bool) {
+        if streaming {
+            self.transmit.clear_sdo();
+        }
+    }
+
+    /// Makes segments of an SDO block upload while there is room for them.
+    fn stream(&mut self, now_us: u64, app: &mut impl Application) {
+        let Self {
+            config,
+            communication,
+            sdo,
+            storing,
+            transmit,
+            ..
+        } = self;
+        let mut objects = Objects {
+            config,
+            communication,
+            app,
+            now_us,
+            storing,
+        };
+        while transmit.has_sdo_room()
+            && let Some(message) = sdo.segment(&mut objects)
+        {
+            transmit.push_sdo(message);
+        }
     }
 
     fn send_emergencies(&mut self, now_us: u64) {
@@ -375,6 +414,10 @@ impl Node {
                 .push(self.communication.emergency.cob_id(), &message);
         }
     }
+}
+
+fn sdo_cob_id(node_id: u8) -> u16 {
+    0x580 + u16::from(node_id)
 }
 
 fn heartbeat_cob_id(node_id: u8) -> u16 {

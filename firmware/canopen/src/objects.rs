@@ -51,7 +51,7 @@ impl<A: Application> Objects<'_, A> {
     /// [`Abort::NoObject`], [`Abort::NoSubindex`].
     pub fn describe(&self, index: u16, subindex: u8) -> Result<Entry, Abort> {
         match index {
-            0x2000.. => self.app.entry(index, subindex),
+            index if is_application(index) => self.app.entry(index, subindex),
             0x1000..=0x1FFF => {
                 let length = match self.value(index, subindex) {
                     Ok(value) => value.length(),
@@ -78,7 +78,7 @@ impl<A: Application> Objects<'_, A> {
     /// The abort code to answer with.
     pub fn read(&self, index: u16, subindex: u8, out: &mut [u8]) -> Result<usize, Abort> {
         match index {
-            0x2000.. => {
+            index if is_application(index) => {
                 let length = self.app.read(index, subindex, out)?;
                 if length <= out.len() {
                     Ok(length)
@@ -97,7 +97,7 @@ impl<A: Application> Objects<'_, A> {
     /// The abort code to answer with.
     pub fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
         match index {
-            0x2000.. => self.app.write(index, subindex, data),
+            index if is_application(index) => self.app.write(index, subindex, data),
             0x1000..=0x1FFF => self.write_communication(index, subindex, data),
             _ => Err(Abort::NoObject),
         }
@@ -278,6 +278,11 @@ fn copy(bytes: &[u8], out: &mut [u8]) -> Result<usize, Abort> {
     let slot = out.get_mut(..bytes.len()).ok_or(Abort::OutOfMemory)?;
     slot.copy_from_slice(bytes);
     Ok(bytes.len())
+}
+
+/// Tells whether the application serves an object.
+const fn is_application(index: u16) -> bool {
+    matches!(index, 0x1021 | 0x1022 | 0x1F50..=0x1F5F | 0x2000..)
 }
 
 /// Tells who may do what with an object of the communication area that exists.

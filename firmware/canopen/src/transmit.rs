@@ -4,15 +4,19 @@ use heapless::Deque;
 
 use crate::Frame;
 
-/// How many frames wait to be sent.
+/// How many frames wait to be sent, without those of the SDO server.
 pub(crate) const TRANSMIT_FRAMES: usize = 16;
+/// How many messages of the SDO server wait to be sent.
+pub(crate) const SDO_FRAMES: usize = 8;
 
 /// Frames in order. When it is full the new frame is dropped, and counted. What is repeated
 /// anyway (a PDO, a heartbeat) never waits twice: new data takes the place of the old, so that a
-/// stalled bus does not fill the queue with the past.
+/// stalled bus does not fill the queue with the past. What the SDO server says waits until all else
+/// has gone.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TransmitQueue {
     frames: Deque<Frame, TRANSMIT_FRAMES>,
+    sdo: Deque<[u8; 8], SDO_FRAMES>,
     dropped: u32,
 }
 
@@ -41,12 +45,34 @@ impl TransmitQueue {
         }
     }
 
-    pub fn pop(&mut self) -> Option<Frame> {
-        self.frames.pop_front()
+    /// Adds a message of the SDO server behind its others.
+    #[inline(never)] // One copy in flash.
+    pub fn push_sdo(&mut self, message: [u8; 8]) {
+        if self.sdo.push_back(message).is_err() {
+            self.dropped = self.dropped.saturating_add(1);
+        }
     }
 
-    /// Forgets the frames with other identifiers than `cob_id`.
+    /// Tells whether a message of the SDO server would find room.
+    pub fn has_sdo_room(&self) -> bool {
+        !self.sdo.is_full()
+    }
+
+    /// Takes back what the SDO server has said and what has not been sent.
+    pub fn clear_sdo(&mut self) {
+        self.sdo.clear();
+    }
+
+    /// Takes the next frame; the SDO server's have the identifier `sdo_cob_id`.
+    pub fn pop(&mut self, sdo_cob_id: u16) -> Option<Frame> {
+        self.frames
+            .pop_front()
+            .or_else(|| Frame::standard(sdo_cob_id, &self.sdo.pop_front()?))
+    }
+
+    /// Forgets the frames with other identifiers than `cob_id`, and the SDO server's.
     pub fn keep_only(&mut self, cob_id: u16) {
+        self.sdo.clear();
         for _ in 0..self.frames.len() {
             if let Some(frame) = self
                 .frames
@@ -61,6 +87,7 @@ impl TransmitQueue {
 
     pub fn clear(&mut self) {
         self.frames.clear();
+        self.sdo.clear();
     }
 
     pub const fn dropped(&self) -> u32 {

@@ -42,8 +42,8 @@ impl Node {
             }
         }
         match self.waiting.take() {
-            Some(Waiting::Sdo { answer, object, .. }) => {
-                let answer = outcome.map_or_else(|abort| refusal(object, abort), |()| answer);
+            Some(Waiting::Sdo { answer, .. }) => {
+                let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
                 self.answer(answer);
             }
             Some(Waiting::Lss) => self.answer_lss(&lss::stored(outcome.is_ok())),
@@ -52,11 +52,9 @@ impl Node {
     }
 
     /// Has an SDO client wait for what it asked to be stored.
-    pub(super) fn wait_for_store(&mut self, now_us: u64, request: [u8; 8], answer: [u8; 8]) {
-        let [_, low, high, subindex, ..] = request;
+    pub(super) fn wait_for_store(&mut self, now_us: u64, answer: [u8; 8]) {
         self.waiting = Some(Waiting::Sdo {
             answer,
-            object: [low, high, subindex],
             deadline_us: now_us.saturating_add(STORE_TIMEOUT_US),
         });
         if let Some(request) = self.storing {
@@ -66,15 +64,11 @@ impl Node {
 
     /// Tells an SDO client that storing takes too long.
     pub(super) fn expire_store(&mut self, now_us: u64) {
-        if let Some(Waiting::Sdo {
-            object,
-            deadline_us,
-            ..
-        }) = self.waiting
+        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting
             && now_us >= deadline_us
         {
             self.waiting = None;
-            self.answer(refusal(object, Abort::Hardware));
+            self.answer(refusal(self.storing, Abort::Hardware));
         }
     }
 
@@ -167,9 +161,14 @@ impl Node {
     }
 }
 
-/// Returns the SDO message that refuses a request for an object.
-fn refusal(object: [u8; 3], abort: Abort) -> [u8; 8] {
-    let [low, high, subindex] = object;
+/// Returns the SDO message that refuses what was asked for.
+fn refusal(request: Option<StoreRequest>, abort: Abort) -> [u8; 8] {
+    let (low, group) = match request {
+        Some(StoreRequest::Save(group)) => (0x10, group as u8),
+        Some(StoreRequest::Restore(group)) => (0x11, group as u8),
+        Some(StoreRequest::NodeId(_)) | None => (0, 0),
+    };
+    let high = if low == 0 { 0 } else { 0x10 };
     let [a, b, c, d] = (abort as u32).to_le_bytes();
-    [0x80, low, high, subindex, a, b, c, d]
+    [0x80, low, high, group, a, b, c, d]
 }

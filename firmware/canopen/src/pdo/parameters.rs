@@ -269,7 +269,7 @@ fn check_mapped(
         Direction::Transmit => entry.tpdo,
     };
     let bits = entry.length.checked_mul(8);
-    if !allowed || entry.length == 0 || bits != Some(mapped.bits) {
+    if !allowed || entry.domain || entry.length == 0 || bits != Some(mapped.bits) {
         return Err(Abort::NotMappable);
     }
     Ok(())

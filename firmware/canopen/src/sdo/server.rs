@@ -1,333 +1,363 @@
-//! The state of a transfer and what each request does to it.
+//! Which transfer runs, and what each request does to it.
 
-use super::SDO_BUFFER;
+use super::block::{Block, Heard};
+use super::download::Download;
+use super::upload::{Upload, check_block_size};
+use super::{BLOCK, Buffer, Message, Multiplexor, SDO_BUFFER, message};
 use crate::objects::Objects;
-use crate::{Abort, Access, Application};
+use crate::{Abort, Application};
 
 /// Silence of the client after which a transfer is aborted.
 const TIMEOUT_US: u64 = 1_000_000;
-/// What a segment carries.
-const SEGMENT: usize = 7;
+/// The command of an abort, in both directions.
+const ABORT: u8 = 0x80;
 
-/// An object as a transfer names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Multiplexor {
-    index: u16,
-    subindex: u8,
-}
-
-impl Multiplexor {
-    /// What an abort names when nothing is being transferred.
-    const NONE: Self = Self {
-        index: 0,
-        subindex: 0,
-    };
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 enum Transfer {
     Idle,
-    Upload {
-        object: Multiplexor,
-        length: usize,
-        sent: usize,
-        toggle: bool,
-    },
-    Download {
-        object: Multiplexor,
-        expected: Option<usize>,
-        received: usize,
-        toggle: bool,
-    },
+    Upload(Upload),
+    Download(Download),
 }
 
 /// The server side of one SDO channel.
 #[derive(Clone, Debug)]
 pub(crate) struct Server {
     transfer: Transfer,
+    /// What is transferred; what an abort names.
+    object: Multiplexor,
+    /// The domain that was begun and has not been ended.
+    begun: Option<Multiplexor>,
     deadline_us: u64,
-    buffer: [u8; SDO_BUFFER],
+    buffer: Buffer,
 }
 
 impl Server {
     pub const fn new() -> Self {
         Self {
             transfer: Transfer::Idle,
+            object: Multiplexor::NONE,
+            begun: None,
             deadline_us: 0,
             buffer: [0; SDO_BUFFER],
         }
     }
 
-    /// Forgets a running transfer without a word.
+    /// Forgets a running transfer without a word; [`settle`](Self::settle) must follow.
     pub fn reset(&mut self) {
         self.transfer = Transfer::Idle;
+        self.object = Multiplexor::NONE;
     }
 
-    /// Returns when a running transfer times out.
+    /// Tells the application of a domain whose download was broken off. To be called after everything
+    /// that may break one off.
+    pub fn settle(&mut self, app: &mut impl Application) {
+        if !matches!(self.transfer, Transfer::Download(_))
+            && let Some(Multiplexor { index, subindex }) = self.begun.take()
+        {
+            // There is nobody left to tell that it failed.
+            let _ = app.end_domain(index, subindex, None);
+        }
+    }
+
+    /// Returns when time alone changes a running transfer.
     pub fn deadline_us(&self) -> Option<u64> {
-        (self.transfer != Transfer::Idle).then_some(self.deadline_us)
+        match &self.transfer {
+            Transfer::Idle => None,
+            Transfer::Upload(_) => Some(self.deadline_us),
+            Transfer::Download(download) => {
+                let quiet_us = download.block.as_ref().and_then(Block::quiet_us);
+                Some(quiet_us.map_or(self.deadline_us, |us| us.min(self.deadline_us)))
+            }
+        }
     }
 
-    /// Ends a transfer whose client fell silent, with the message to send about it.
-    pub fn expire(&mut self, now_us: u64) -> Option<[u8; 8]> {
+    /// Ends a transfer whose client fell silent, or tells the client what is missing: the message
+    /// to send about it.
+    pub fn expire(&mut self, now_us: u64) -> Option<Message> {
         if self
             .deadline_us()
             .is_none_or(|deadline_us| now_us < deadline_us)
         {
             return None;
         }
-        Some(self.abort(Abort::Timeout))
+        let mut answer = Err(Abort::Timeout);
+        if now_us < self.deadline_us
+            && let Transfer::Download(download) = &mut self.transfer
+            && let Some(block) = &mut download.block
+        {
+            answer = block.expire(now_us);
+        }
+        answer.unwrap_or_else(|abort| Some(self.abort(abort)))
     }
 
     /// Answers a request; `None` when it needs no answer.
     pub fn request<A: Application>(
         &mut self,
-        request: [u8; 8],
+        request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Option<[u8; 8]> {
-        let [command, low, high, subindex, data @ ..] = request;
-        let object = Multiplexor {
-            index: u16::from_le_bytes([low, high]),
-            subindex,
+    ) -> Option<Message> {
+        let answer = self.serve(request, objects);
+        answer.unwrap_or_else(|abort| Some(self.abort(abort)))
+    }
+
+    /// Tells whether segments of an upload may be on their way.
+    pub fn is_streaming(&self) -> bool {
+        matches!(&self.transfer, Transfer::Upload(upload) if upload.is_streaming())
+    }
+
+    /// Tells whether [`segment`](Self::segment) has one.
+    pub fn has_segment(&self) -> bool {
+        matches!(&self.transfer, Transfer::Upload(upload) if upload.has_segment())
+    }
+
+    /// Makes the next segment of a block upload: at most one for each that the client asked for.
+    pub fn segment<A: Application>(&mut self, objects: &mut Objects<'_, A>) -> Option<Message> {
+        let Transfer::Upload(upload) = &mut self.transfer else {
+            return None;
         };
+        if !upload.has_segment() {
+            return None;
+        }
         self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
-        let answer = match command >> 5 {
-            0 => self.download_segment(request, objects),
-            1 => self.start_download(command, object, data, objects),
-            2 => self.start_upload(object, objects),
-            3 => self.upload_segment(command),
-            4 => {
-                self.transfer = Transfer::Idle;
-                return None;
+        let segment = upload.next(&mut self.buffer, objects);
+        Some(segment.unwrap_or_else(|abort| self.abort(abort)))
+    }
+
+    fn serve<A: Application>(
+        &mut self,
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Option<Message>, Abort> {
+        let [command, first, second, ..] = request;
+        if let Transfer::Download(download) = &self.transfer
+            && download.is_in_block()
+            && command != ABORT
+        {
+            return self.block_segment(request, objects);
+        }
+        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        match (command >> 5, command & 3) {
+            (0, _) => self.download_segment(request, objects).map(Some),
+            (1, _) => self.start_download(request, objects).map(Some),
+            (2, _) => self.start_upload(request, objects).map(Some),
+            (3, _) => self.upload_segment(command, objects).map(Some),
+            (4, _) => {
+                self.reset();
+                Ok(None)
             }
-            // What the client wants to transfer in blocks names its object like other transfers.
-            5 if command & 3 == 0 => self.refuse(object, Abort::Command),
-            6 if command & 1 == 0 => self.refuse(object, Abort::Command),
+            (5, 0) => self.start_block_upload(request, objects).map(Some),
+            (5, 1) => {
+                self.upload()?.end()?;
+                self.reset();
+                Ok(None)
+            }
+            (5, 2) => self.upload()?.acknowledge(first, second),
+            (5, 3) => self.upload()?.start().map(|()| None),
+            (6, 0 | 2) => self.start_block_download(request, objects).map(Some),
+            (6, _) => self.end_block_download(request, objects).map(Some),
             _ => Err(Abort::Command),
-        };
-        Some(answer.unwrap_or_else(|abort| self.abort(abort)))
+        }
     }
 
     /// Ends the transfer and makes the message that says why.
-    fn abort(&mut self, abort: Abort) -> [u8; 8] {
-        let object = match self.transfer {
-            Transfer::Idle => Multiplexor::NONE,
-            Transfer::Upload { object, .. } | Transfer::Download { object, .. } => object,
-        };
-        self.transfer = Transfer::Idle;
-        message(0x80, object, (abort as u32).to_le_bytes())
+    #[inline(never)] // One copy in flash.
+    fn abort(&mut self, abort: Abort) -> Message {
+        let object = self.object;
+        self.reset();
+        message(ABORT, object, (abort as u32).to_le_bytes())
     }
 
-    /// Answers a request that starts a transfer with an abort that names its object.
-    fn refuse(&mut self, object: Multiplexor, abort: Abort) -> Result<[u8; 8], Abort> {
-        self.transfer = Transfer::Idle;
-        Ok(message(0x80, object, (abort as u32).to_le_bytes()))
+    fn upload(&mut self) -> Result<&mut Upload, Abort> {
+        match &mut self.transfer {
+            Transfer::Upload(upload) => Ok(upload),
+            _ => Err(Abort::Command),
+        }
+    }
+
+    fn download(&mut self) -> Result<(&mut Download, &mut Buffer), Abort> {
+        match &mut self.transfer {
+            Transfer::Download(download) => Ok((download, &mut self.buffer)),
+            _ => Err(Abort::Command),
+        }
+    }
+
+    /// Ends what runs and names the object of the request, from now on. Returns the other four bytes.
+    fn start<A: Application>(&mut self, request: Message, objects: &mut Objects<'_, A>) -> [u8; 4] {
+        let [_, low, high, subindex, data @ ..] = request;
+        self.reset();
+        self.settle(objects.app);
+        self.object = Multiplexor {
+            index: u16::from_le_bytes([low, high]),
+            subindex,
+        };
+        data
     }
 
     fn start_upload<A: Application>(
         &mut self,
-        object: Multiplexor,
-        objects: &Objects<'_, A>,
-    ) -> Result<[u8; 8], Abort> {
-        let length = match self.fetch(object, objects) {
-            Ok(length) => length,
-            Err(abort) => return self.refuse(object, abort),
-        };
-        if let (1..=4, Some(value)) = (length, self.buffer.first_chunk::<4>()) {
-            self.transfer = Transfer::Idle;
-            let mut data = [0; 4];
-            for (slot, byte) in data.iter_mut().zip(value).take(length) {
-                *slot = *byte;
-            }
-            return Ok(message(0x43 | ((4 - length) << 2) as u8, object, data));
-        }
-        self.transfer = Transfer::Upload {
-            object,
-            length,
-            sent: 0,
-            toggle: false,
-        };
-        Ok(message(0x41, object, (length as u32).to_le_bytes()))
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        self.start(request, objects);
+        let upload = Upload::open(self.object, &mut self.buffer, objects)?;
+        self.answer_upload(upload, objects)
     }
 
-    /// Reads the object into the buffer and returns its length.
-    fn fetch<A: Application>(
+    /// Answers with the object itself where it fits, otherwise with its length.
+    fn answer_upload<A: Application>(
         &mut self,
-        object: Multiplexor,
-        objects: &Objects<'_, A>,
-    ) -> Result<usize, Abort> {
-        let entry = objects.describe(object.index, object.subindex)?;
-        if entry.access == Access::WriteOnly {
-            return Err(Abort::WriteOnly);
+        mut upload: Upload,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        let (object, length) = (self.object, upload.length());
+        if !matches!(length, 1..=4) {
+            self.transfer = Transfer::Upload(upload);
+            return Ok(message(0x41, object, length.to_le_bytes()));
         }
-        objects.read(object.index, object.subindex, &mut self.buffer)
+        let [a, b, c, d, ..] = upload.first(&mut self.buffer, objects)?;
+        self.reset();
+        let unused = 4 - length as u8;
+        Ok(message(0x43 | unused << 2, object, [a, b, c, d]))
     }
 
-    fn upload_segment(&mut self, command: u8) -> Result<[u8; 8], Abort> {
-        let Transfer::Upload {
-            object,
-            length,
-            sent,
-            toggle,
-        } = self.transfer
-        else {
+    fn upload_segment<A: Application>(
+        &mut self,
+        command: u8,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        let Transfer::Upload(upload) = &mut self.transfer else {
             return Err(Abort::Command);
         };
-        if (command & 0x10 != 0) != toggle {
-            return Err(Abort::ToggleBit);
+        let (answer, last) = upload.segment(command, &mut self.buffer, objects)?;
+        if last {
+            self.reset();
         }
-        let rest = self.buffer.get(sent..length).unwrap_or(&[]);
-        let carried = rest.len().min(SEGMENT);
-        let last = rest.len() <= SEGMENT;
-        let flags = u8::from(toggle) << 4 | ((SEGMENT - carried) << 1) as u8 | u8::from(last);
-        let mut answer = [flags, 0, 0, 0, 0, 0, 0, 0];
-        for (slot, byte) in answer.iter_mut().skip(1).zip(rest) {
-            *slot = *byte;
-        }
-        self.transfer = if last {
-            Transfer::Idle
-        } else {
-            Transfer::Upload {
-                object,
-                length,
-                sent: sent + carried,
-                toggle: !toggle,
-            }
-        };
         Ok(answer)
+    }
+
+    fn start_block_upload<A: Application>(
+        &mut self,
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        let [command, ..] = request;
+        let [size, threshold, ..] = self.start(request, objects);
+        check_block_size(size)?;
+        let mut upload = Upload::open(self.object, &mut self.buffer, objects)?;
+        let length = upload.length();
+        if threshold > 0 && length <= u32::from(threshold) {
+            return self.answer_upload(upload, objects);
+        }
+        upload.use_blocks(size, command & 4 != 0);
+        self.transfer = Transfer::Upload(upload);
+        Ok(message(0xC6, self.object, length.to_le_bytes()))
     }
 
     fn start_download<A: Application>(
         &mut self,
-        command: u8,
-        object: Multiplexor,
-        data: [u8; 4],
+        request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<[u8; 8], Abort> {
-        self.transfer = Transfer::Idle;
+    ) -> Result<Message, Abort> {
+        let [command, ..] = request;
+        let data = self.start(request, objects);
+        let object = self.object;
         let expedited = command & 2 != 0;
-        let sized = command & 1 != 0;
-        let done = if expedited {
-            let given = sized.then_some(4 - usize::from(command >> 2 & 3));
-            write_expedited(object, data, given, objects)
+        let size = if expedited {
+            4 - u32::from(command >> 2 & 3)
         } else {
-            self.open_download(object, sized.then_some(u32::from_le_bytes(data)), objects)
+            u32::from_le_bytes(data)
         };
-        match done {
-            Ok(()) => Ok(message(0x60, object, [0; 4])),
-            Err(abort) => self.refuse(object, abort),
+        self.open_download((command & 1 != 0).then_some(size), None, objects)?;
+        if expedited {
+            let (download, buffer) = self.download()?;
+            download.expedited(data, buffer, objects)?;
+            self.finish_download(objects)?;
         }
+        Ok(message(0x60, object, [0; 4]))
     }
 
+    fn start_block_download<A: Application>(
+        &mut self,
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        let [command, ..] = request;
+        let data = self.start(request, objects);
+        let size = (command & 2 != 0).then_some(u32::from_le_bytes(data));
+        self.open_download(size, Some(Block::new(command & 4 != 0)), objects)?;
+        Ok(message(0xA4, self.object, [BLOCK, 0, 0, 0]))
+    }
+
+    #[inline(never)] // One copy in flash.
     fn open_download<A: Application>(
         &mut self,
-        object: Multiplexor,
         size: Option<u32>,
-        objects: &Objects<'_, A>,
+        block: Option<Block>,
+        objects: &mut Objects<'_, A>,
     ) -> Result<(), Abort> {
-        let fixed = writable_length(object, objects)?;
-        let expected = size.map(|size| usize::try_from(size).unwrap_or(usize::MAX));
-        if let Some(expected) = expected {
-            check_length(expected, fixed)?;
-            if expected > SDO_BUFFER {
-                return Err(Abort::OutOfMemory);
-            }
-        }
-        let expected = expected.or(fixed);
-        self.transfer = Transfer::Download {
-            object,
-            expected,
-            received: 0,
-            toggle: false,
-        };
+        let mut download = Download::open(self.object, size, objects)?;
+        self.begun = download.domain.then_some(self.object);
+        download.block = block;
+        self.transfer = Transfer::Download(download);
         Ok(())
     }
 
     fn download_segment<A: Application>(
         &mut self,
-        request: [u8; 8],
+        request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<[u8; 8], Abort> {
-        let Transfer::Download {
-            object,
-            expected,
-            received,
-            toggle,
-        } = self.transfer
-        else {
-            return Err(Abort::Command);
+    ) -> Result<Message, Abort> {
+        let (download, buffer) = self.download()?;
+        let (answer, last) = download.segment(request, buffer, objects)?;
+        if last {
+            self.finish_download(objects)?;
+        }
+        Ok(answer)
+    }
+
+    fn block_segment<A: Application>(
+        &mut self,
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Option<Message>, Abort> {
+        let [first, ..] = request;
+        let (download, buffer) = self.download()?;
+        download.block_segment(request, buffer, objects);
+        let block = download.block.as_mut().ok_or(Abort::General)?;
+        let answer = match block.hear(first, objects.now_us)? {
+            Heard::Again => return Ok(None),
+            Heard::Forward => None,
+            Heard::Acknowledge(message) => Some(message),
         };
-        let [command, data @ ..] = request;
-        if (command & 0x10 != 0) != toggle {
-            return Err(Abort::ToggleBit);
-        }
-        let carried = SEGMENT - usize::from(command >> 1 & 7);
-        let total = received + carried;
-        if expected.is_some_and(|expected| total > expected) {
-            return Err(Abort::TooLong);
-        }
-        let slot = self
-            .buffer
-            .get_mut(received..total)
-            .ok_or(Abort::OutOfMemory)?;
-        for (slot, byte) in slot.iter_mut().zip(data) {
-            *slot = byte;
-        }
-        if command & 1 == 0 {
-            self.transfer = Transfer::Download {
-                object,
-                expected,
-                received: total,
-                toggle: !toggle,
-            };
-        } else {
-            if expected.is_some_and(|expected| total < expected) {
-                return Err(Abort::TooShort);
-            }
-            let value = self.buffer.get(..total).unwrap_or(&[]);
-            objects.write(object.index, object.subindex, value)?;
-            self.transfer = Transfer::Idle;
-        }
-        Ok([0x20 | u8::from(toggle) << 4, 0, 0, 0, 0, 0, 0, 0])
+        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        Ok(answer)
     }
-}
 
-/// Returns the object's length, where it has a fixed one.
-fn writable_length<A: Application>(
-    object: Multiplexor,
-    objects: &Objects<'_, A>,
-) -> Result<Option<usize>, Abort> {
-    let entry = objects.describe(object.index, object.subindex)?;
-    if matches!(entry.access, Access::Constant | Access::ReadOnly) {
-        return Err(Abort::ReadOnly);
+    fn end_block_download<A: Application>(
+        &mut self,
+        request: Message,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<Message, Abort> {
+        let (download, buffer) = self.download()?;
+        download.end_blocks(request, buffer, objects)?;
+        self.finish_download(objects)?;
+        Ok([0xA1, 0, 0, 0, 0, 0, 0, 0])
     }
-    Ok((entry.length > 0).then_some(usize::from(entry.length)))
-}
 
-fn check_length(given: usize, fixed: Option<usize>) -> Result<(), Abort> {
-    match fixed {
-        Some(fixed) if given > fixed => Err(Abort::TooLong),
-        Some(fixed) if given < fixed => Err(Abort::TooShort),
-        _ => Ok(()),
+    #[inline(never)] // One copy in flash.
+    fn finish_download<A: Application>(
+        &mut self,
+        objects: &mut Objects<'_, A>,
+    ) -> Result<(), Abort> {
+        let (download, _) = self.download()?;
+        download.check_complete()?;
+        let Transfer::Download(download) = &self.transfer else {
+            return Err(Abort::General);
+        };
+        // Well or not, the domain has been ended from here on.
+        self.begun = None;
+        download.finish(&self.buffer, objects)?;
+        self.reset();
+        Ok(())
     }
-}
-
-fn write_expedited<A: Application>(
-    object: Multiplexor,
-    data: [u8; 4],
-    given: Option<usize>,
-    objects: &mut Objects<'_, A>,
-) -> Result<(), Abort> {
-    let fixed = writable_length(object, objects)?;
-    // Without a size, the object's own length says how much of the four bytes is meant.
-    let length = given.or(fixed).unwrap_or(4);
-    check_length(length, fixed)?;
-    let value = data.get(..length).ok_or(Abort::TooShort)?;
-    objects.write(object.index, object.subindex, value)
-}
-
-fn message(command: u8, object: Multiplexor, data: [u8; 4]) -> [u8; 8] {
-    let [low, high] = object.index.to_le_bytes();
-    let [a, b, c, d] = data;
-    [command, low, high, object.subindex, a, b, c, d]
 }
