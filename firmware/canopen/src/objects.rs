@@ -165,6 +165,9 @@ impl<A: Application> Objects<'_, A> {
     }
 
     fn write_communication(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
+        if index != 0x1003 {
+            self.app.may_configure()?;
+        }
         let communication = &mut *self.communication;
         match (index, subindex) {
             (0x1003, 0) => match u8_from(data)? {
@@ -208,7 +211,6 @@ impl<A: Application> Objects<'_, A> {
         if self.storing.is_some() {
             return Err(Abort::DeviceState);
         }
-        self.app.may_store()?;
         *self.storing = Some(request(group));
         Ok(())
     }

@@ -214,7 +214,7 @@ fn the_id_is_stored_by_whoever_has_the_flash_and_then_outlives_a_reset() {
     byte(&mut bench, 0x17, 0);
     bench.node.finish_store(bench.now_us, Err(Abort::Hardware));
     assert_eq!(bench.sent(), answer([0x17, 2, 0, 0, 0, 0, 0, 0]));
-    bench.app.refuse_to_store = true;
+    bench.app.refuse_configuration = true;
     assert_eq!(
         byte(&mut bench, 0x17, 0),
         answer([0x17, 2, 0, 0, 0, 0, 0, 0])

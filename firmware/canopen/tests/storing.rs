@@ -178,9 +178,23 @@ fn nothing_is_stored_without_the_signature_or_against_the_device_s_state() {
     assert_eq!(bench.write(0x1010, 4, SAVE, 4), Err(0x0609_0011));
     assert_eq!(bench.write(0x1010, 0, 1, 1), Err(0x0601_0002));
     assert_eq!(bench.write(0x1010, 1, SAVE, 2), Err(0x0607_0013));
-    bench.app.refuse_to_store = true;
+    bench.app.refuse_configuration = true;
     assert_eq!(bench.write(0x1010, 1, SAVE, 4), Err(0x0800_0022));
     assert_eq!(bench.events(), []);
+}
+
+#[test]
+fn the_application_can_keep_the_communication_as_it_is() {
+    let mut bench = Bench::operational();
+    bench.app.refuse_configuration = true;
+    let defaults = readings(&mut bench);
+    for (index, subindex, value, length) in CHANGED {
+        let refused = Err(0x0800_0022);
+        assert_eq!(bench.write(index, subindex, value, length), refused);
+    }
+    assert_eq!(readings(&mut bench), defaults);
+    assert_eq!(bench.write(0x1003, 0, 0, 1), Ok(()));
+    assert_eq!(bench.write(0x2000, 1, 5, 2), Ok(()));
 }
 
 #[test]

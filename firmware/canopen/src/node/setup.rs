@@ -126,7 +126,7 @@ impl Node {
         match outcome {
             Outcome::Silence => {}
             Outcome::Answer(answer) => self.answer_lss(&answer),
-            Outcome::Store if self.storing.is_some() || app.may_store().is_err() => {
+            Outcome::Store if self.storing.is_some() || app.may_configure().is_err() => {
                 self.answer_lss(&lss::stored(false));
             }
             Outcome::Store => {

@@ -107,7 +107,7 @@ pub struct Store {
     pub status: u32,
     pub text: Vec<u8>,
     pub refuse: bool,
-    pub refuse_to_store: bool,
+    pub refuse_configuration: bool,
 }
 
 impl Store {
@@ -121,7 +121,7 @@ impl Store {
             status: 0x3344_5566,
             text: Vec::new(),
             refuse: false,
-            refuse_to_store: false,
+            refuse_configuration: false,
         }
     }
 }
@@ -193,8 +193,8 @@ impl Application for Store {
         Ok(())
     }
 
-    fn may_store(&self) -> Result<(), Abort> {
-        if self.refuse_to_store {
+    fn may_configure(&self) -> Result<(), Abort> {
+        if self.refuse_configuration {
             Err(Abort::DeviceState)
         } else {
             Ok(())
