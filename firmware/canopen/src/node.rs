@@ -425,5 +425,8 @@ fn heartbeat_cob_id(node_id: u8) -> u16 {
 }
 
 fn earlier(a: Option<u64>, b: Option<u64>) -> Option<u64> {
-    a.into_iter().chain(b).min()
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
 }

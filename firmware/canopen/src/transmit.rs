@@ -70,18 +70,22 @@ impl TransmitQueue {
             .or_else(|| Frame::standard(sdo_cob_id, &self.sdo.pop_front()?))
     }
 
-    /// Forgets the frames with other identifiers than `cob_id`, and the SDO server's.
+    /// Forgets all but what has one byte and the identifier `cob_id`: a boot-up message and a
+    /// heartbeat, at most.
+    #[inline(never)] // One copy in flash.
     pub fn keep_only(&mut self, cob_id: u16) {
-        self.sdo.clear();
-        for _ in 0..self.frames.len() {
-            if let Some(frame) = self
-                .frames
-                .pop_front()
-                .filter(|f| f.cob_id() == Some(cob_id))
+        let mut kept = [None; 2];
+        while let Some(frame) = self.frames.pop_front() {
+            if let &[state] = frame.data()
+                && frame.cob_id() == Some(cob_id)
             {
-                // One was taken out just before.
-                let _ = self.frames.push_back(frame);
+                let [_, before] = kept;
+                kept = [before, Some(state)];
             }
+        }
+        self.sdo.clear();
+        for state in kept.into_iter().flatten() {
+            self.push(cob_id, &[state]);
         }
     }
 

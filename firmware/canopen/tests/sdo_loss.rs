@@ -258,61 +258,86 @@ fn transfers() -> u32 {
 
 /// Runs transfers and returns how many ended well for the client, and how many blocks arrived in part.
 fn run(noise: Noise, seed: u64, always_crc: bool) -> (u32, u32) {
-    let transfers = transfers();
     println!("seed {seed:#X}, {noise:?}");
     let mut client = Client::new(noise, seed);
     let mut well = 0;
-    for number in 0..transfers {
+    for number in 0..transfers() {
         let object = client.random.pick(&[(DOMAIN, 1), (VALUE, 0)]);
         let most = if object == (VALUE, 0) { 884 } else { 2_500 };
         let length = 5 + client.random.below(most) as usize;
         let bytes: Vec<u8> = (0..length).map(|_| client.random.next() as u8).collect();
         let with_crc = always_crc || client.random.below(2) == 0;
-        let sized = client.random.below(2) == 0;
-        let kind = client.random.below(5);
-        let result = match kind {
-            0 | 1 => client.download_blocks(object, &bytes, with_crc, sized),
-            2 => client.download_segments(object, &bytes),
-            _ => {
-                // A domain stays as it is while the server still believes in a download.
-                let mut expected = bytes.clone();
-                if object == (VALUE, 0) {
-                    client.line.app.value.clone_from(&bytes);
-                } else if client.line.app.is_writing() {
-                    expected.clone_from(&client.line.app.domain);
-                } else {
-                    client.line.app.domain.clone_from(&bytes);
-                }
-                let result = if kind == 3 {
-                    client.upload_segments(object)
-                } else {
-                    client.upload_blocks(object, with_crc)
-                };
-                result.map(|received| assert!(received == expected, "{number}: {object:X?}"))
-            }
+        let result = if client.random.below(2) == 0 {
+            download(&mut client, object, &bytes, with_crc, number)
+        } else {
+            upload(&mut client, object, bytes, with_crc, number)
         };
-        match result {
-            Ok(()) => well += 1,
-            Err(Failed) => client.give_up(object.0, object.1),
-        }
-        // Whatever the client believes, what the server took over is what was sent.
-        if kind < 3 {
-            let complete =
-                client
-                    .line
-                    .app
-                    .calls()
-                    .contains(&Call::End(DOMAIN, 1, Some(length as u32)));
-            let written = std::mem::take(&mut client.line.app.values_written) > 0;
-            if object == (DOMAIN, 1) && (complete || result.is_ok()) {
-                assert!(client.line.app.domain == bytes, "{number}");
-            }
-            if object == (VALUE, 0) && (written || result.is_ok()) {
-                assert!(client.line.app.value == bytes, "{number}");
-            }
-        }
+        well += u32::from(result.is_ok());
     }
     (well, client.segments_again)
+}
+
+fn download(
+    client: &mut Client,
+    object: (u16, u8),
+    bytes: &[u8],
+    with_crc: bool,
+    number: u32,
+) -> Result<(), Failed> {
+    let sized = client.random.below(2) == 0;
+    let result = if client.random.below(3) == 0 {
+        client.download_segments(object, bytes)
+    } else {
+        client.download_blocks(object, bytes, with_crc, sized)
+    };
+    if result.is_err() {
+        client.give_up(object.0, object.1);
+    }
+    // Whatever the client believes, what the server took over is what was sent.
+    let app = &mut client.line.app;
+    let end = Call::End(object.0, object.1, Some(bytes.len() as u32));
+    let complete = app.calls().contains(&end);
+    let written = std::mem::take(&mut app.values_written) > 0;
+    if object == (VALUE, 0) {
+        let right = app.value == bytes;
+        assert!(right || !written && result.is_err(), "transfer {number}");
+    } else {
+        let right = app.domain == bytes;
+        assert!(right || !complete && result.is_err(), "transfer {number}");
+    }
+    result
+}
+
+fn upload(
+    client: &mut Client,
+    object: (u16, u8),
+    bytes: Vec<u8>,
+    with_crc: bool,
+    number: u32,
+) -> Result<(), Failed> {
+    let app = &mut client.line.app;
+    // A domain stays as it is while the server still believes in a download.
+    let expected = if object == (DOMAIN, 1) && app.is_writing() {
+        app.domain.clone()
+    } else {
+        bytes
+    };
+    if object == (VALUE, 0) {
+        app.value.clone_from(&expected);
+    } else {
+        app.domain.clone_from(&expected);
+    }
+    let result = if client.random.below(3) == 0 {
+        client.upload_segments(object)
+    } else {
+        client.upload_blocks(object, with_crc)
+    };
+    let Ok(received) = result else {
+        client.give_up(object.0, object.1);
+        return Err(Failed);
+    };
+    assert!(received == expected, "transfer {number}");
+    Ok(())
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The segments of a block download: which is the next, and what is acknowledged when.
 
 use super::crc::Crc;
-use super::{BLOCK, Message, SEGMENT};
+use super::{BLOCK, SEGMENT};
 use crate::Abort;
 
 /// Silence in the middle of a block after which the server acknowledges what it has, because the
@@ -98,8 +98,7 @@ impl Block {
         Some(self.held.replace(data))
     }
 
-    /// Counts a segment as heard. Returns whether the block goes on; and the acknowledgement where
-    /// it ends with this segment.
+    /// Counts a segment as heard, and ends the block where that was the last.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
@@ -124,17 +123,18 @@ impl Block {
         self.quiet_us
     }
 
-    /// Acknowledges what there is when the client has fallen silent in the middle of the block.
+    /// Ends the block when the client has fallen silent in the middle of it, and returns how many
+    /// segments have come.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn expire(&mut self, now_us: u64) -> Result<Option<Message>, Abort> {
+    pub fn expire(&mut self, now_us: u64) -> Result<Option<u8>, Abort> {
         if self.quiet_us.is_none_or(|quiet_us| now_us < quiet_us) {
             return Ok(None);
         }
-        let message = self.acknowledge()?;
+        let good = self.acknowledge()?;
         self.early = true;
-        Ok(Some(message))
+        Ok(Some(good))
     }
 
     /// Returns the last segment of the object.
@@ -142,7 +142,7 @@ impl Block {
         self.held.take_if(|_| self.at_end)
     }
 
-    fn acknowledge(&mut self) -> Result<Message, Abort> {
+    fn acknowledge(&mut self) -> Result<u8, Abort> {
         if let Some(abort) = self.failure {
             return Err(abort);
         }
@@ -157,7 +157,7 @@ impl Block {
         let good = core::mem::take(&mut self.good);
         self.heard = 0;
         self.quiet_us = None;
-        Ok([0xA2, good, BLOCK, 0, 0, 0, 0, 0])
+        Ok(good)
     }
 }
 
@@ -168,6 +168,6 @@ pub(super) enum Heard {
     Forward,
     /// It is not.
     Again,
-    /// It ends the block; this is the answer.
-    Acknowledge(Message),
+    /// It ends the block, of which so many segments have come.
+    Acknowledge(u8),
 }

@@ -71,7 +71,7 @@ impl Download {
         self.take(value, buffer, objects)
     }
 
-    /// Takes a segment and returns its answer and whether it was the last.
+    /// Takes a segment and tells whether it was the last.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
@@ -80,7 +80,7 @@ impl Download {
         request: Message,
         buffer: &mut Buffer,
         objects: &mut Objects<'_, A>,
-    ) -> Result<(Message, bool), Abort> {
+    ) -> Result<bool, Abort> {
         if self.block.is_some() {
             return Err(Abort::Command);
         }
@@ -89,9 +89,8 @@ impl Download {
             return Err(Abort::ToggleBit);
         }
         self.take(used(&data, command >> 1), buffer, objects)?;
-        let answer = [0x20 | u8::from(self.toggle) << 4, 0, 0, 0, 0, 0, 0, 0];
         self.toggle = !self.toggle;
-        Ok((answer, command & 1 != 0))
+        Ok(command & 1 != 0)
     }
 
     /// Tells whether what comes next is a segment of a block, whatever it looks like.

@@ -28,6 +28,8 @@ pub(crate) struct Server {
     /// The domain that was begun and has not been ended.
     begun: Option<Multiplexor>,
     deadline_us: u64,
+    /// What is to be said in return.
+    answer: Option<Message>,
     buffer: Buffer,
 }
 
@@ -38,11 +40,13 @@ impl Server {
             object: Multiplexor::NONE,
             begun: None,
             deadline_us: 0,
+            answer: None,
             buffer: [0; SDO_BUFFER],
         }
     }
 
     /// Forgets a running transfer without a word; [`settle`](Self::settle) must follow.
+    #[inline(never)] // One copy in flash.
     pub fn reset(&mut self) {
         self.transfer = Transfer::Idle;
         self.object = Multiplexor::NONE;
@@ -74,20 +78,21 @@ impl Server {
     /// Ends a transfer whose client fell silent, or tells the client what is missing: the message
     /// to send about it.
     pub fn expire(&mut self, now_us: u64) -> Option<Message> {
-        if self
-            .deadline_us()
-            .is_none_or(|deadline_us| now_us < deadline_us)
-        {
+        let deadline_us = self.deadline_us()?;
+        if now_us < deadline_us {
             return None;
         }
-        let mut answer = Err(Abort::Timeout);
+        let mut good = Err(Abort::Timeout);
         if now_us < self.deadline_us
             && let Transfer::Download(download) = &mut self.transfer
             && let Some(block) = &mut download.block
         {
-            answer = block.expire(now_us);
+            good = block.expire(now_us);
         }
-        answer.unwrap_or_else(|abort| Some(self.abort(abort)))
+        match good {
+            Ok(good) => good.map(acknowledgement),
+            Err(abort) => Some(self.abort(abort)),
+        }
     }
 
     /// Answers a request; `None` when it needs no answer.
@@ -96,8 +101,11 @@ impl Server {
         request: Message,
         objects: &mut Objects<'_, A>,
     ) -> Option<Message> {
-        let answer = self.serve(request, objects);
-        answer.unwrap_or_else(|abort| Some(self.abort(abort)))
+        self.answer = None;
+        match self.serve(request, objects) {
+            Ok(()) => self.answer,
+            Err(abort) => Some(self.abort(abort)),
+        }
     }
 
     /// Tells whether segments of an upload may be on their way.
@@ -123,11 +131,12 @@ impl Server {
         Some(segment.unwrap_or_else(|abort| self.abort(abort)))
     }
 
+    #[inline(never)] // One copy in flash.
     fn serve<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Option<Message>, Abort> {
+    ) -> Result<(), Abort> {
         let [command, first, second, ..] = request;
         if let Transfer::Download(download) = &self.transfer
             && download.is_in_block()
@@ -137,26 +146,35 @@ impl Server {
         }
         self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
         match (command >> 5, command & 3) {
-            (0, _) => self.download_segment(request, objects).map(Some),
-            (1, _) => self.start_download(request, objects).map(Some),
-            (2, _) => self.start_upload(request, objects).map(Some),
-            (3, _) => self.upload_segment(command, objects).map(Some),
+            (0, _) => self.download_segment(request, objects),
+            (1, _) => self.start_download(request, objects),
+            (2, _) => self.start_upload(request, objects),
+            (3, _) => self.upload_segment(command, objects),
             (4, _) => {
                 self.reset();
-                Ok(None)
+                Ok(())
             }
-            (5, 0) => self.start_block_upload(request, objects).map(Some),
+            (5, 0) => self.start_block_upload(request, objects),
             (5, 1) => {
                 self.upload()?.end()?;
                 self.reset();
-                Ok(None)
+                Ok(())
             }
-            (5, 2) => self.upload()?.acknowledge(first, second),
-            (5, 3) => self.upload()?.start().map(|()| None),
-            (6, 0 | 2) => self.start_block_download(request, objects).map(Some),
-            (6, _) => self.end_block_download(request, objects).map(Some),
+            (5, 2) => {
+                self.answer = self.upload()?.acknowledge(first, second)?;
+                Ok(())
+            }
+            (5, 3) => self.upload()?.start(),
+            (6, 0 | 2) => self.start_block_download(request, objects),
+            (6, _) => self.end_block_download(request, objects),
             _ => Err(Abort::Command),
         }
+    }
+
+    /// Answers with the four bytes of `data` and the object.
+    #[inline(never)] // One copy in flash.
+    fn say(&mut self, command: u8, data: [u8; 4]) {
+        self.answer = Some(message(command, self.object, data));
     }
 
     /// Ends the transfer and makes the message that says why.
@@ -182,6 +200,7 @@ impl Server {
     }
 
     /// Ends what runs and names the object of the request, from now on. Returns the other four bytes.
+    #[inline(never)] // One copy in flash.
     fn start<A: Application>(&mut self, request: Message, objects: &mut Objects<'_, A>) -> [u8; 4] {
         let [_, low, high, subindex, data @ ..] = request;
         self.reset();
@@ -197,7 +216,7 @@ impl Server {
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         self.start(request, objects);
         let upload = Upload::open(self.object, &mut self.buffer, objects)?;
         self.answer_upload(upload, objects)
@@ -208,38 +227,42 @@ impl Server {
         &mut self,
         mut upload: Upload,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
-        let (object, length) = (self.object, upload.length());
+    ) -> Result<(), Abort> {
+        let length = upload.length();
         if !matches!(length, 1..=4) {
+            self.say(0x41, length.to_le_bytes());
             self.transfer = Transfer::Upload(upload);
-            return Ok(message(0x41, object, length.to_le_bytes()));
+            return Ok(());
         }
         let [a, b, c, d, ..] = upload.first(&mut self.buffer, objects)?;
-        self.reset();
         let unused = 4 - length as u8;
-        Ok(message(0x43 | unused << 2, object, [a, b, c, d]))
+        self.say(0x43 | unused << 2, [a, b, c, d]);
+        self.reset();
+        Ok(())
     }
 
     fn upload_segment<A: Application>(
         &mut self,
         command: u8,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         let Transfer::Upload(upload) = &mut self.transfer else {
             return Err(Abort::Command);
         };
-        let (answer, last) = upload.segment(command, &mut self.buffer, objects)?;
-        if last {
+        let segment = upload.segment(command, &mut self.buffer, objects)?;
+        let [flags, ..] = segment;
+        if flags & 1 != 0 {
             self.reset();
         }
-        Ok(answer)
+        self.answer = Some(segment);
+        Ok(())
     }
 
     fn start_block_upload<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         let [command, ..] = request;
         let [size, threshold, ..] = self.start(request, objects);
         check_block_size(size)?;
@@ -250,17 +273,17 @@ impl Server {
         }
         upload.use_blocks(size, command & 4 != 0);
         self.transfer = Transfer::Upload(upload);
-        Ok(message(0xC6, self.object, length.to_le_bytes()))
+        self.say(0xC6, length.to_le_bytes());
+        Ok(())
     }
 
     fn start_download<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         let [command, ..] = request;
         let data = self.start(request, objects);
-        let object = self.object;
         let expedited = command & 2 != 0;
         let size = if expedited {
             4 - u32::from(command >> 2 & 3)
@@ -268,24 +291,26 @@ impl Server {
             u32::from_le_bytes(data)
         };
         self.open_download((command & 1 != 0).then_some(size), None, objects)?;
+        self.say(0x60, [0; 4]);
         if expedited {
             let (download, buffer) = self.download()?;
             download.expedited(data, buffer, objects)?;
             self.finish_download(objects)?;
         }
-        Ok(message(0x60, object, [0; 4]))
+        Ok(())
     }
 
     fn start_block_download<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         let [command, ..] = request;
         let data = self.start(request, objects);
         let size = (command & 2 != 0).then_some(u32::from_le_bytes(data));
         self.open_download(size, Some(Block::new(command & 4 != 0)), objects)?;
-        Ok(message(0xA4, self.object, [BLOCK, 0, 0, 0]))
+        self.say(0xA4, [BLOCK, 0, 0, 0]);
+        Ok(())
     }
 
     #[inline(never)] // One copy in flash.
@@ -306,42 +331,44 @@ impl Server {
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
+        let [command, ..] = request;
         let (download, buffer) = self.download()?;
-        let (answer, last) = download.segment(request, buffer, objects)?;
-        if last {
+        if download.segment(request, buffer, objects)? {
             self.finish_download(objects)?;
         }
-        Ok(answer)
+        self.answer = Some([0x20 | command & 0x10, 0, 0, 0, 0, 0, 0, 0]);
+        Ok(())
     }
 
     fn block_segment<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Option<Message>, Abort> {
+    ) -> Result<(), Abort> {
         let [first, ..] = request;
         let (download, buffer) = self.download()?;
         download.block_segment(request, buffer, objects);
         let block = download.block.as_mut().ok_or(Abort::General)?;
-        let answer = match block.hear(first, objects.now_us)? {
-            Heard::Again => return Ok(None),
-            Heard::Forward => None,
-            Heard::Acknowledge(message) => Some(message),
-        };
+        match block.hear(first, objects.now_us)? {
+            Heard::Again => return Ok(()),
+            Heard::Forward => {}
+            Heard::Acknowledge(good) => self.answer = Some(acknowledgement(good)),
+        }
         self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
-        Ok(answer)
+        Ok(())
     }
 
     fn end_block_download<A: Application>(
         &mut self,
         request: Message,
         objects: &mut Objects<'_, A>,
-    ) -> Result<Message, Abort> {
+    ) -> Result<(), Abort> {
         let (download, buffer) = self.download()?;
         download.end_blocks(request, buffer, objects)?;
         self.finish_download(objects)?;
-        Ok([0xA1, 0, 0, 0, 0, 0, 0, 0])
+        self.answer = Some([0xA1, 0, 0, 0, 0, 0, 0, 0]);
+        Ok(())
     }
 
     #[inline(never)] // One copy in flash.
@@ -349,15 +376,18 @@ impl Server {
         &mut self,
         objects: &mut Objects<'_, A>,
     ) -> Result<(), Abort> {
-        let (download, _) = self.download()?;
-        download.check_complete()?;
         let Transfer::Download(download) = &self.transfer else {
             return Err(Abort::General);
         };
+        download.check_complete()?;
         // Well or not, the domain has been ended from here on.
         self.begun = None;
         download.finish(&self.buffer, objects)?;
         self.reset();
         Ok(())
     }
+}
+
+fn acknowledgement(good: u8) -> Message {
+    [0xA2, good, BLOCK, 0, 0, 0, 0, 0]
 }

@@ -91,7 +91,7 @@ impl Upload {
         self.bytes_at(self.base, buffer, objects)
     }
 
-    /// Answers the request for a segment and tells whether it was the last.
+    /// Makes the segment that is asked for; the last is marked by its lowest bit.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
@@ -100,7 +100,7 @@ impl Upload {
         command: u8,
         buffer: &mut Buffer,
         objects: &mut Objects<'_, A>,
-    ) -> Result<(Message, bool), Abort> {
+    ) -> Result<Message, Abort> {
         if self.block.is_some() {
             return Err(Abort::Command);
         }
@@ -114,7 +114,7 @@ impl Upload {
         let flags = u8::from(self.toggle) << 4 | (unused as u8) << 1 | u8::from(last);
         self.base = self.base.saturating_add(SEGMENT as u32);
         self.toggle = !self.toggle;
-        Ok((segment(flags, bytes), last))
+        Ok(segment(flags, bytes))
     }
 
     /// Sends in blocks of `size` segments from now on, and computes the CRC if asked to.
