@@ -218,7 +218,7 @@ impl Application for Served<'_> {
         Ok(())
     }
 
-    fn may_store(&self) -> Result<(), Abort> {
+    fn may_configure(&self) -> Result<(), Abort> {
         if self.core.machine.is_live() {
             return Err(Abort::DeviceState);
         }
