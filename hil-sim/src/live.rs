@@ -15,12 +15,24 @@ const SHOWN: Duration = Duration::from_secs(1);
 pub struct Live<'a> {
     /// Name of the interface.
     pub interface: &'a str,
-    /// Which vertebrae.
+    /// Which vertebrae, by place in the chain, have their node id.
     pub nodes: &'a [NodeId],
+    /// Which have none, until LSS gives them one.
+    pub unconfigured: &'a [NodeId],
     /// Time until the end, s; until Ctrl-C without one.
     pub seconds: Option<f64>,
     /// Where encoders start, noise of the sensors.
     pub seed: u64,
+}
+
+impl Live<'_> {
+    /// Returns how many vertebrae there are.
+    #[cfg(target_os = "linux")]
+    fn count(&self) -> usize {
+        let all = NodeId::all();
+        all.filter(|id| self.nodes.contains(id) || self.unconfigured.contains(id))
+            .count()
+    }
 }
 
 /// Runs the vertebrae and tells whether the bus took every frame.
@@ -36,7 +48,9 @@ pub fn run(live: &Live<'_>) -> anyhow::Result<bool> {
     // The text of a bus error names its cause and the cure.
     let told = |error: BusError| anyhow::anyhow!(error.to_string());
     let bus = SocketBus::open(live.interface).map_err(told)?;
-    let mut vertebrae = Realtime::with_nodes(bus, &Config::default(), live.seed, live.nodes);
+    let plant = Config::default();
+    let (nodes, unconfigured) = (live.nodes, live.unconfigured);
+    let mut vertebrae = Realtime::with_unconfigured(bus, &plant, live.seed, nodes, unconfigured);
     let mut display = Display::new();
     let limit = live.seconds.map(Duration::from_secs_f64);
     let start = Instant::now();
@@ -57,7 +71,7 @@ pub fn run(live: &Live<'_>) -> anyhow::Result<bool> {
     println!(
         "{} on {} for {:.1} s: {received} frames in, {sent} out, {skipped} ticks late, {dropped} \
          frames not taken by the bus",
-        match live.nodes.len() {
+        match live.count() {
             1 => "1 vertebra".to_owned(),
             count => format!("{count} vertebrae"),
         },

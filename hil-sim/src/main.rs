@@ -35,9 +35,14 @@ struct LiveArgs {
     /// to, until Ctrl-C; `cargo xtask vcan -- COMMAND` runs a command beside a vcan0
     #[arg(long, value_name = "IFACE")]
     can: Option<String>,
-    /// With --can: which vertebrae, by node id, as 3,5 or 1-4,9; all ten without it
+    /// With --can: which vertebrae, by node id, as 3,5 or 1-4,9; all ten without it, or those that
+    /// are not unconfigured
     #[arg(long, value_name = "IDS", value_parser = node_ids)]
     nodes: Option<NodeList>,
+    /// With --can: which vertebrae, by their place in the chain, have no node id: they are silent until
+    /// an LSS master gives them one
+    #[arg(long, value_name = "PLACES", value_parser = node_ids)]
+    unconfigured: Option<NodeList>,
     /// With --can: time until the end, s [0.1 to 1e6]
     #[arg(long, value_parser = between(0.1, 1e6))]
     seconds: Option<f64>,
@@ -49,7 +54,10 @@ struct LiveArgs {
 impl LiveArgs {
     /// Tells whether an option was given that means nothing without an interface.
     fn is_used(&self) -> bool {
-        self.nodes.is_some() || self.seconds.is_some() || self.seed.is_some()
+        self.nodes.is_some()
+            || self.unconfigured.is_some()
+            || self.seconds.is_some()
+            || self.seed.is_some()
     }
 }
 
@@ -139,8 +147,8 @@ fn main() -> ExitCode {
         (Some(Command::Check(args)), _) => run_checks(args),
         (None, Some(interface)) => run_live(interface, &cli.live),
         (None, None) if cli.live.is_used() => Err(anyhow::anyhow!(
-            "--nodes, --seconds and --seed go with --can IFACE; to swim in simulated time, put \
-             `swim` before the options: hil-sim swim --seconds 5"
+            "--nodes, --unconfigured, --seconds and --seed go with --can IFACE; to swim in simulated \
+             time, put `swim` before the options: hil-sim swim --seconds 5"
         )),
         (None, None) => run_swim(&SwimArgs::defaults()),
     };
@@ -199,11 +207,13 @@ fn run_live(interface: &str, args: &LiveArgs) -> anyhow::Result<bool> {
         .nodes
         .clone()
         .unwrap_or_else(|| NodeList(NodeId::all().collect()));
+    let unconfigured = args.unconfigured.as_ref().map_or(&[][..], |list| &list.0);
     let (seconds, seed) = (args.seconds, args.seed.unwrap_or(1));
     interrupt::listen()?;
     live::run(&live::Live {
         interface,
         nodes: &nodes.0,
+        unconfigured,
         seconds,
         seed,
     })

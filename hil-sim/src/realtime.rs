@@ -67,11 +67,27 @@ impl<B: Bus> Realtime<B> {
     /// Powers some of the prototypes up. The whole eel is in the water; motors of vertebrae that are
     /// not here, but perhaps elsewhere on the bus, are off.
     pub fn with_nodes(bus: B, plant: &PlantConfig, seed: u64, nodes: &[NodeId]) -> Self {
-        let powered = NodeId::all().filter(|id| nodes.contains(id));
+        Self::with_unconfigured(bus, plant, seed, nodes, &[])
+    }
+
+    /// Powers some of the prototypes up, and at the places `unconfigured` such as have no node id yet.
+    /// A place in both lists is unconfigured.
+    pub fn with_unconfigured(
+        bus: B,
+        plant: &PlantConfig,
+        seed: u64,
+        nodes: &[NodeId],
+        unconfigured: &[NodeId],
+    ) -> Self {
+        let power = |id: NodeId| match (unconfigured.contains(&id), nodes.contains(&id)) {
+            (true, _) => Some((id, NativeNode::unconfigured(id))),
+            (false, true) => Some((id, NativeNode::new(id))),
+            (false, false) => None,
+        };
         Self {
             bus,
             plant: Plant::new(plant, seed),
-            nodes: powered.map(|id| (id, NativeNode::new(id))).collect(),
+            nodes: NodeId::all().filter_map(power).collect(),
             drives: [[Drive::Off; 3]; NODES],
             local: Vec::new(),
             incoming: Vec::new(),
@@ -135,7 +151,7 @@ impl<B: Bus> Realtime<B> {
         &self.plant
     }
 
-    /// Returns a vertebra, where it is one of these.
+    /// Returns the vertebra at a place in the chain, where it is one of these.
     pub fn node(&self, id: NodeId) -> Option<&NativeNode> {
         self.nodes
             .iter()

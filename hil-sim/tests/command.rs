@@ -85,6 +85,8 @@ fn wrong_words_end_with_2_and_name_what_is_right() {
         (&["swim", "--wavelength", "NaN"], "0.2 to 3"),
         (&["--can", "vcan0", "--nodes", "3-11"], "1 to 10"),
         (&["--nodes", "3"], "--can IFACE"),
+        (&["--unconfigured", "3"], "--can IFACE"),
+        (&["--can", "vcan0", "--unconfigured", "0"], "1 to 10"),
         (&["--seconds", "3"], "hil-sim swim"),
         (&["swim", "--seconds", "1", "--out", "/dev/null/x"], "--out"),
     ] {

@@ -15,6 +15,7 @@ use eel_protocol::{Cob, Frame, NodeId, Target};
 use eel_tests::skip;
 use eel_units::{Angle, Instant as Moment, Voltage};
 use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, Output, Start};
+use eel_vertebra::store::{self, RamFlash, Store};
 use eel_vertebra::{Drive, Settings, Vertebra, turn};
 use hil_sim::bus::Event as BusEvent;
 use hil_sim::plant::Plant;
@@ -212,12 +213,14 @@ fn upload_request(numbers: &mut Numbers, cob_id: u16) -> Frame {
 /// Runs the crate on this machine.
 fn run_natively(script: &[Step]) -> Vec<Output> {
     let mut vertebra = None;
+    // Outlives a start, as the image's does.
+    let mut store = Store::new(RamFlash::new());
     let mut outputs = Vec::new();
     for step in script {
         match step {
             Step::Start(start) => {
                 let settings = Settings::prototype(start.node, start.serial);
-                vertebra = Some(Vertebra::new(settings, start.now));
+                vertebra = Some(Vertebra::with_stored(settings, &store.load(), start.now));
             }
             Step::Turn(input) => {
                 let vertebra = vertebra.as_mut().expect("started");
@@ -231,6 +234,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                     let kept = output.frames.push(frame);
                     output.lost += u8::from(kept.is_err());
                 });
+                store::serve(vertebra, &mut store, input.now);
                 outputs.push(output);
             }
         }

@@ -2,6 +2,7 @@
 
 use cortex_m_semihosting::debug;
 use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
+use eel_vertebra::store::{self, RamFlash, Store};
 use eel_vertebra::{Settings, Vertebra, turn};
 
 use crate::console::{leave, say};
@@ -50,6 +51,7 @@ fn run() -> Result<(), Failure> {
     let mut input = Pipe::open(c"lockstep.in")?;
     let mut output = Pipe::create(c"lockstep.out")?;
     let mut vertebra = None;
+    let mut store = Store::new(RamFlash::new());
     let mut body = [0; MAX_PACKET - HEADER];
     loop {
         let mut header = [0; HEADER];
@@ -64,11 +66,14 @@ fn run() -> Result<(), Failure> {
         match (kind, &mut vertebra) {
             (Kind::Start, _) => {
                 let lockstep::Start { node, serial, now } = lockstep::Start::decode(body)?;
-                vertebra = Some(Vertebra::new(Settings::prototype(node, serial), now));
+                let settings = Settings::prototype(node, serial);
+                vertebra = Some(Vertebra::with_stored(settings, &store.load(), now));
             }
             (Kind::Input, Some(vertebra)) => {
                 let given = lockstep::Input::decode(body)?;
+                let now = given.now;
                 let made = meter.count(|| answer(vertebra, given));
+                store::serve(vertebra, &mut store, now);
                 output.write_all(made.encode().as_bytes())?;
             }
             (Kind::Input, None) | (Kind::Output, _) => return Err(Failure::Order),

@@ -11,6 +11,7 @@ mod image {
 
     use eel_head::{Config, Gait, Head, Plane};
     use eel_protocol::{Frame, NodeId};
+    use eel_vertebra::store::{self, RamFlash, Store};
     use eel_vertebra::{Settings, Vertebra, lockstep, turn};
 
     #[cortex_m_rt::entry]
@@ -22,9 +23,11 @@ mod image {
         let start = if black_box(false) {
             Vertebra::after_failure
         } else {
-            Vertebra::new
+            Vertebra::with_stored
         };
-        let mut vertebra = start(black_box(Settings::prototype(node, 1)), now);
+        let mut store = black_box(Store::new(RamFlash::new()));
+        let settings = black_box(Settings::prototype(node, 1));
+        let mut vertebra = start(settings, &store.load(), now);
         let (amplitude, wavelength) = black_box((800, 8_000));
         let Ok(gait) = Gait::new(
             black_box(1_000),
@@ -41,6 +44,7 @@ mod image {
             }
             if let Ok(input) = lockstep::Input::decode(black_box(&[])) {
                 take_turn(&mut vertebra, input);
+                store::serve(&mut vertebra, &mut store, black_box(now));
             }
         }
     }

@@ -185,11 +185,12 @@ pub trait Application {
         Ok(())
     }
 
-    /// Tells whether parameters may be stored or restored now (0x1010, 0x1011, LSS).
+    /// Tells whether parameters of the communication area (0x1000–0x1FFF, but for the history of
+    /// errors) may be written now, and parameters and the node id stored or restored.
     ///
     /// # Errors
     /// The abort code to answer with, such as [`Abort::DeviceState`].
-    fn may_store(&self) -> Result<(), Abort> {
+    fn may_configure(&self) -> Result<(), Abort> {
         Ok(())
     }
 }

@@ -5,7 +5,8 @@ use crate::emergency::Emergency;
 use crate::heartbeat::{Consumer, Producer};
 use crate::pdo::{Rpdo, Tpdo};
 use crate::sync::Sync;
-use crate::{Config, NmtCommand};
+use crate::time::Time;
+use crate::{Abort, Config, NmtCommand};
 
 /// What the objects 0x1000–0x1FFF stand for.
 #[derive(Clone, Debug)]
@@ -13,6 +14,9 @@ pub(crate) struct Communication {
     pub producer: Producer,
     pub consumer: Consumer,
     pub sync: Sync,
+    pub time: Time,
+    /// Object 0x1029, subindex 1.
+    pub error_behaviour: u8,
     pub rpdos: [Rpdo; PDOS],
     pub tpdos: [Tpdo; PDOS],
     pub emergency: Emergency,
@@ -27,6 +31,8 @@ impl Communication {
             producer: Producer::new(config.heartbeat_ms, now_us),
             consumer: Consumer::new(config.consumer),
             sync: Sync::new(config.sync_cob_id, config.sync_counter_overflow),
+            time: Time::new(config.time_cob_id),
+            error_behaviour: config.error_behaviour,
             rpdos: core::array::from_fn(rpdo),
             tpdos: core::array::from_fn(tpdo),
             emergency: Emergency::new(config),
@@ -41,6 +47,8 @@ impl Communication {
         self.producer = Producer::new(config.heartbeat_ms, now_us);
         self.consumer = Consumer::new(config.consumer);
         self.sync = Sync::new(config.sync_cob_id, config.sync_counter_overflow);
+        self.time = Time::new(config.time_cob_id);
+        self.error_behaviour = config.error_behaviour;
         for (place, rpdo) in self.rpdos.iter_mut().enumerate() {
             *rpdo = Rpdo::new(config.rpdos.get(place), node_id);
         }
@@ -48,6 +56,18 @@ impl Communication {
             *tpdo = Tpdo::new(config.tpdos.get(place), node_id);
         }
         self.emergency.reset(command, config);
+    }
+
+    /// Writes object 0x1029, subindex 1.
+    ///
+    /// # Errors
+    /// [`Abort::Value`] above 2.
+    pub fn write_error_behaviour(&mut self, behaviour: u8) -> Result<(), Abort> {
+        if behaviour > 2 {
+            return Err(Abort::Value);
+        }
+        self.error_behaviour = behaviour;
+        Ok(())
     }
 
     /// Returns when the earliest of the timers that always run ends.

@@ -247,6 +247,18 @@ impl Emergency {
         Ok(())
     }
 
+    /// Tells whether emergencies are sent.
+    pub const fn is_enabled(&self) -> bool {
+        self.enabled
+    }
+
+    /// Takes a stored identifier over; `None` for one that can't be.
+    pub fn restore(&mut self, cob_id: u16, enabled: bool) -> Option<()> {
+        self.cob_id = cob_id::parse(u32::from(cob_id)).ok()?;
+        self.enabled = enabled;
+        Some(())
+    }
+
     /// Returns object 0x1015 in 100 µs.
     pub const fn inhibit_100us(&self) -> u16 {
         self.inhibit_100us

@@ -70,13 +70,14 @@ pub enum StoreRequest {
 
 /// A group of parameters: the subindex of objects 0x1010 and 0x1011.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Group {
     /// Subindex 1: all that can be stored.
-    All,
+    All = 1,
     /// Subindex 2: the communication area, 0x1000–0x1FFF.
-    Communication,
+    Communication = 2,
     /// Subindex 3: the application's parameters.
-    Application,
+    Application = 3,
 }
 
 impl Group {

@@ -50,10 +50,12 @@
 //! ```
 //!
 //! Served: NMT, heartbeats sent and watched (0x1016, 0x1017), SYNC with counter (0x1005, 0x1019),
-//! four RPDOs and four TPDOs with mapping at run time, inhibit and event times, emergencies
-//! (0x1001, 0x1003, 0x1014, 0x1015), one SDO server, expedited, segmented and in blocks with CRC, for
-//! values of up to 889 bytes and for domains of any length, behind every other frame. Deliberately
-//! absent: remote frames and node guarding, identifiers of 29 bits, single bits in PDOs.
+//! TIME (0x1012), four RPDOs and four TPDOs with mapping at run time, inhibit and event times,
+//! emergencies (0x1001, 0x1003, 0x1014, 0x1015), what follows a failure (0x1029), parameters stored and
+//! restored (0x1010, 0x1011), LSS, and one SDO server, expedited, segmented and in blocks with CRC, for
+//! values of up to 889 bytes and for domains of any length. What is to be stored goes to the node's
+//! owner as an [`Event::Store`]. Deliberately absent: remote frames and node guarding, identifiers of
+//! 29 bits, single bits in PDOs, other bit rates.
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(clippy::float_arithmetic)]
@@ -66,13 +68,16 @@ mod emergency;
 mod event;
 mod frame;
 mod heartbeat;
+mod lss;
 mod nmt;
 mod node;
 mod objects;
 mod pdo;
 mod queue;
 mod sdo;
+mod stored;
 mod sync;
+mod time;
 mod transmit;
 
 pub use application::{Abort, Access, Application, Entry};
@@ -84,6 +89,4 @@ pub use nmt::{NmtCommand, NmtState};
 pub use node::{Counters, Node};
 pub use queue::EventQueue;
 pub use sdo::SDO_BUFFER;
-
-/// The most bytes that the stored parameters of a communication area take.
-pub const STORED_PARAMETERS: usize = 400;
+pub use stored::STORED_PARAMETERS;

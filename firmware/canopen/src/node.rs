@@ -1,12 +1,22 @@
 //! The node: frames and time in, frames and events out.
 
+mod process_data;
+mod setup;
+
+use heapless::Vec;
+
 use crate::communication::Communication;
 use crate::emergency::Fault;
+use crate::lss::{self, Lss};
 use crate::objects::Objects;
-use crate::pdo::Received;
 use crate::sdo::Server;
+use crate::stored;
+use crate::time;
 use crate::transmit::TransmitQueue;
-use crate::{Abort, Application, Config, Event, EventQueue, Frame, Mapped, NmtCommand, NmtState};
+use crate::{
+    Application, Config, Event, EventQueue, Frame, NmtCommand, NmtState, STORED_PARAMETERS,
+    StoreRequest,
+};
 
 /// How many events wait to be polled.
 const EVENTS: usize = 16;
@@ -40,11 +50,29 @@ pub struct Node {
     state: NmtState,
     communication: Communication,
     sdo: Server,
+    lss: Lss,
+    /// The node id after a reset of the node.
+    stored_id: u8,
+    /// The parameters after a reset; empty for the defaults.
+    stored: Vec<u8, STORED_PARAMETERS>,
+    stored_refused: bool,
+    /// What is being stored, and who waits for it.
+    storing: Option<StoreRequest>,
+    waiting: Option<Waiting>,
     transmit: TransmitQueue,
     events: EventQueue<Event, EVENTS>,
     rpdos_short: u32,
     rpdos_refused: u32,
     tpdos_refused: u32,
+}
+
+/// Who waits for something to be stored.
+#[derive(Clone, Copy, Debug)]
+enum Waiting {
+    /// The SDO client, which gets this answer once it is done and never later than `deadline_us`.
+    Sdo { answer: [u8; 8], deadline_us: u64 },
+    /// The LSS master.
+    Lss,
 }
 
 impl Node {
@@ -55,18 +83,29 @@ impl Node {
     /// With a node id outside 1–127 the node is unconfigured: it stays `Initialising` and only
     /// listens to LSS.
     pub fn new(config: Config, stored: &[u8], app: &impl Application, now_us: u64) -> Self {
-        let _ = (stored, app);
         let mut node = Self {
             config,
             state: NmtState::Initialising,
             communication: Communication::new(&config, now_us),
             sdo: Server::new(),
+            lss: Lss::new(config.node_id),
+            stored_id: config.node_id,
+            stored: Vec::from_slice(stored).unwrap_or_default(),
+            stored_refused: false,
+            storing: None,
+            waiting: None,
             transmit: TransmitQueue::default(),
             events: EventQueue::default(),
             rpdos_short: 0,
             rpdos_refused: 0,
             tpdos_refused: 0,
         };
+        node.load(now_us);
+        if node.stored.len() != stored.len() || !stored::is_served(&node.communication, app) {
+            node.stored.clear();
+            node.communication = Communication::new(&node.config, now_us);
+        }
+        node.stored_refused = node.stored.len() != stored.len();
         node.boot();
         node
     }
@@ -77,11 +116,17 @@ impl Node {
     /// four RPDOs are written, four TPDOs read, or one SDO request answered.
     pub fn handle_frame(&mut self, now_us: u64, frame: &Frame, app: &mut impl Application) {
         let Some(cob_id) = frame.cob_id() else { return };
-        if frame.is_remote() || self.state == NmtState::Initialising {
+        if frame.is_remote() {
+            return;
+        }
+        let data = frame.data();
+        if cob_id == lss::REQUEST {
+            self.set_layer(now_us, data, app);
+        }
+        if self.state == NmtState::Initialising {
             return;
         }
         self.expire(now_us);
-        let data = frame.data();
         if cob_id == 0 {
             self.command(now_us, data);
         } else if self.communication.consumer.node().map(heartbeat_cob_id) == Some(cob_id) {
@@ -91,6 +136,10 @@ impl Node {
                 self.synchronise(now_us, data, app);
             } else if cob_id == 0x600 + u16::from(self.config.node_id) {
                 self.serve(now_us, data, app);
+            } else if self.communication.time.cob_id() == Some(cob_id) {
+                if let Some((days, ms)) = time::of_day(data) {
+                    self.events.push(Event::Time { days, ms });
+                }
             } else if self.state == NmtState::Operational {
                 self.receive(cob_id, data, app);
             }
@@ -130,6 +179,9 @@ impl Node {
             return None;
         }
         let mut deadline = earlier(self.communication.deadline_us(), self.sdo.deadline_us());
+        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting {
+            deadline = earlier(deadline, Some(deadline_us));
+        }
         if self.sdo.has_segment() && self.transmit.has_sdo_room() {
             deadline = Some(0);
         }
@@ -202,18 +254,6 @@ impl Node {
         self.send_emergencies(now_us);
     }
 
-    /// Writes the parameters of the communication area to the start of `out` and returns how many
-    /// bytes they take, at most [`STORED_PARAMETERS`](crate::STORED_PARAMETERS); 0 when `out` is too short.
-    pub fn save_parameters(&self, out: &mut [u8]) -> usize {
-        let _ = out;
-        0
-    }
-
-    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not.
-    pub fn finish_store(&mut self, now_us: u64, outcome: Result<(), Abort>) {
-        let _ = (now_us, outcome);
-    }
-
     /// Asks for one transmission of TPDO `number` (1–4): type 0 sends it at the next SYNC, types
     /// 254 and 255 at the next [`tick`](Self::tick) that the inhibit time allows. Has no effect
     /// unless the node is Operational.
@@ -240,10 +280,7 @@ impl Node {
             return;
         };
         if command.is_reset() {
-            self.transmit.clear();
-            self.sdo.reset();
-            self.communication.reset(command, &self.config, now_us);
-            self.boot();
+            self.reset(command, now_us);
         } else if command.target() == self.state {
             return;
         } else {
@@ -278,12 +315,14 @@ impl Node {
             self.communication
                 .emergency
                 .raise_fault(Fault::Heartbeat, node);
+            self.behave_after_error(now_us);
         }
         let streaming = self.sdo.is_streaming();
         if let Some(message) = self.sdo.expire(now_us) {
             self.withdraw(streaming);
             self.answer(message);
         }
+        self.expire_store(now_us);
     }
 
     fn hear(&mut self, now_us: u64, data: &[u8]) {
@@ -301,104 +340,6 @@ impl Node {
         }
     }
 
-    fn synchronise(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
-        let Some(counter) = self.communication.sync.counter(data) else {
-            self.events.push(Event::SyncLength);
-            let length = data.len() as u8;
-            self.communication
-                .emergency
-                .raise_fault(Fault::SyncLength, length);
-            return;
-        };
-        self.communication.emergency.clear_fault(Fault::SyncLength);
-        let operational = self.state == NmtState::Operational;
-        if operational {
-            for place in 0..self.communication.rpdos.len() {
-                self.apply_rpdo(place, app);
-            }
-        }
-        self.events.push(Event::Sync { counter });
-        app.synchronised(counter);
-        if operational {
-            for place in 0..self.communication.tpdos.len() {
-                let tpdo = self.communication.tpdos.get_mut(place);
-                if tpdo.is_some_and(|tpdo| tpdo.is_due_at_sync(counter)) {
-                    self.send_tpdo(place, now_us, app);
-                }
-            }
-        }
-    }
-
-    fn receive(&mut self, cob_id: u16, data: &[u8], app: &mut impl Application) {
-        for place in 0..self.communication.rpdos.len() {
-            let Some(rpdo) = self.communication.rpdos.get_mut(place) else {
-                return;
-            };
-            let number = place as u8 + 1;
-            let received = rpdo.receive(cob_id, data);
-            match received {
-                Received::Other => {}
-                Received::Short => {
-                    self.rpdos_short = self.rpdos_short.saturating_add(1);
-                    self.events.push(Event::RpdoLength { number });
-                    let fault = Fault::RpdoLength(number);
-                    self.communication.emergency.raise_fault(fault, number);
-                }
-                Received::Kept | Received::Due => {
-                    self.communication
-                        .emergency
-                        .clear_fault(Fault::RpdoLength(number));
-                    if received == Received::Due {
-                        self.apply_rpdo(place, app);
-                    }
-                }
-            }
-        }
-    }
-
-    #[inline(never)] // One copy in flash.
-    fn apply_rpdo(&mut self, place: usize, app: &mut impl Application) {
-        let Some(rpdo) = self.communication.rpdos.get_mut(place) else {
-            return;
-        };
-        let number = place as u8 + 1;
-        if rpdo.apply(number, app) == Some(false) {
-            self.rpdos_refused = self.rpdos_refused.saturating_add(1);
-            self.events.push(Event::RpdoRefused { number });
-        }
-    }
-
-    #[inline(never)] // One copy in flash.
-    fn send_tpdo(&mut self, place: usize, now_us: u64, app: &mut impl Application) {
-        let Some(parameters) = self
-            .communication
-            .tpdos
-            .get(place)
-            .map(|tpdo| tpdo.parameters)
-        else {
-            return;
-        };
-        app.tpdo_due(place as u8 + 1, parameters.cob_id());
-        let Self {
-            config,
-            communication,
-            ..
-        } = self;
-        let objects = Objects {
-            config,
-            communication,
-            app,
-            now_us,
-        };
-        let mut data = [0; 8];
-        if read_mapped(&objects, parameters.mapping(), &mut data).is_none() {
-            self.tpdos_refused = self.tpdos_refused.saturating_add(1);
-            return;
-        }
-        let data = data.get(..usize::from(parameters.bytes())).unwrap_or(&[]);
-        self.transmit.replace(parameters.cob_id(), data);
-    }
-
     #[inline(never)] // One copy in flash.
     fn serve(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
         let Ok(request) = data.try_into() else { return };
@@ -406,6 +347,7 @@ impl Node {
             config,
             communication,
             sdo,
+            storing,
             ..
         } = self;
         let mut objects = Objects {
@@ -413,12 +355,17 @@ impl Node {
             communication,
             app,
             now_us,
+            storing,
         };
+        let was_asked = objects.storing.is_some();
         let streaming = sdo.is_streaming();
         let answer = sdo.request(request, &mut objects);
+        let is_asked = objects.storing.is_some() && !was_asked;
         self.withdraw(streaming);
-        if let Some(message) = answer {
-            self.answer(message);
+        match answer {
+            Some(answer) if is_asked => self.wait_for_store(now_us, answer),
+            Some(answer) => self.answer(answer),
+            None => {}
         }
     }
 
@@ -440,6 +387,7 @@ impl Node {
             config,
             communication,
             sdo,
+            storing,
             transmit,
             ..
         } = self;
@@ -448,6 +396,7 @@ impl Node {
             communication,
             app,
             now_us,
+            storing,
         };
         while transmit.has_sdo_room()
             && let Some(message) = sdo.segment(&mut objects)
@@ -465,23 +414,6 @@ impl Node {
                 .push(self.communication.emergency.cob_id(), &message);
         }
     }
-}
-
-/// Puts the mapped objects one behind the other; `None` when one can't be read at its length.
-fn read_mapped<A: Application>(
-    objects: &Objects<'_, A>,
-    mapping: &[Mapped],
-    data: &mut [u8; 8],
-) -> Option<()> {
-    let mut rest: &mut [u8] = data;
-    for mapped in mapping {
-        let (slot, others) = rest.split_at_mut_checked(mapped.bytes())?;
-        if objects.read(mapped.index, mapped.subindex, slot) != Ok(slot.len()) {
-            return None;
-        }
-        rest = others;
-    }
-    Some(())
 }
 
 fn sdo_cob_id(node_id: u8) -> u16 {

@@ -4,7 +4,7 @@
 use crate::communication::Communication;
 use crate::emergency::Fault;
 use crate::pdo::{Parameters, Rpdo, Tpdo};
-use crate::{Abort, Access, Application, Config, Entry, Mapped};
+use crate::{Abort, Access, Application, Config, Entry, Group, Mapped, StoreRequest};
 
 /// The highest subindex of 0x1400 and of 0x1800.
 const RPDO_PARAMETERS: u8 = 2;
@@ -16,7 +16,15 @@ pub(crate) struct Objects<'a, A> {
     pub communication: &'a mut Communication,
     pub app: &'a mut A,
     pub now_us: u64,
+    /// What a write asked to be stored; while it is not done, nothing else can be asked for.
+    pub storing: &'a mut Option<StoreRequest>,
 }
+
+/// What is written to 0x1010 and 0x1011: "save" and "load".
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+/// What 0x1010 and 0x1011 read as: it is done on command.
+const ON_COMMAND: u32 = 1;
 
 /// An object's value with its type.
 #[derive(Clone, Copy, Debug)]
@@ -107,6 +115,9 @@ impl<A: Application> Objects<'_, A> {
             (0x1008, 0) => Value::Text(self.config.device_name),
             (0x1009, 0) => Value::Text(self.config.hardware_version),
             (0x100A, 0) => Value::Text(self.config.software_version),
+            (0x1010 | 0x1011, 0) => Value::U8(3),
+            (0x1010 | 0x1011, 1..=3) => Value::U32(ON_COMMAND),
+            (0x1012, 0) => Value::U32(communication.time.to_raw()),
             (0x1014, 0) => Value::U32(emergency.raw_cob_id()),
             (0x1015, 0) => Value::U16(emergency.inhibit_100us()),
             (0x1016, 0) => Value::U8(1),
@@ -118,12 +129,13 @@ impl<A: Application> Objects<'_, A> {
             (0x1018, 3) => Value::U32(self.config.identity.revision),
             (0x1018, 4) => Value::U32(self.config.identity.serial),
             (0x1019, 0) => Value::U8(communication.sync.overflow()),
+            (0x1029, 0) => Value::U8(1),
+            (0x1029, 1) => Value::U8(communication.error_behaviour),
             (0x1200, 0) => Value::U8(2),
             (0x1200, 1) => Value::U32(0x600 + u32::from(self.config.node_id)),
             (0x1200, 2) => Value::U32(0x580 + u32::from(self.config.node_id)),
-            (0x1000 | 0x1001 | 0x1005 | 0x1008..=0x100A | 0x1014..=0x1019 | 0x1200, _) => {
-                return Err(Abort::NoSubindex);
-            }
+            (0x1000 | 0x1001 | 0x1005 | 0x1008..=0x100A | 0x1010..=0x1012, _)
+            | (0x1014..=0x1019 | 0x1029 | 0x1200, _) => return Err(Abort::NoSubindex),
             _ => return self.pdo_value(index, subindex),
         };
         Ok(value)
@@ -153,6 +165,9 @@ impl<A: Application> Objects<'_, A> {
     }
 
     fn write_communication(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
+        if index != 0x1003 {
+            self.app.may_configure()?;
+        }
         let communication = &mut *self.communication;
         match (index, subindex) {
             (0x1003, 0) => match u8_from(data)? {
@@ -160,6 +175,13 @@ impl<A: Application> Objects<'_, A> {
                 _ => return Err(Abort::Value),
             },
             (0x1005, 0) => communication.sync.write_cob_id(u32_from(data)?)?,
+            (0x1010, 1..=3) => {
+                return self.ask_to_store(u32_from(data)? == SAVE, subindex, StoreRequest::Save);
+            }
+            (0x1011, 1..=3) => {
+                return self.ask_to_store(u32_from(data)? == LOAD, subindex, StoreRequest::Restore);
+            }
+            (0x1012, 0) => communication.time.write(u32_from(data)?)?,
             (0x1014, 0) => communication.emergency.write_cob_id(u32_from(data)?)?,
             (0x1015, 0) => communication.emergency.set_inhibit(u16_from(data)?),
             (0x1016, 1) => {
@@ -170,8 +192,26 @@ impl<A: Application> Objects<'_, A> {
                 .producer
                 .set_period(u16_from(data)?, self.now_us),
             (0x1019, 0) => communication.sync.write_overflow(u8_from(data)?)?,
+            (0x1029, 1) => communication.write_error_behaviour(u8_from(data)?)?,
             _ => return self.write_pdo(index, subindex, data),
         }
+        Ok(())
+    }
+
+    fn ask_to_store(
+        &mut self,
+        signed: bool,
+        subindex: u8,
+        request: impl Fn(Group) -> StoreRequest,
+    ) -> Result<(), Abort> {
+        let group = Group::from_subindex(subindex).ok_or(Abort::NoSubindex)?;
+        if !signed {
+            return Err(Abort::Transfer);
+        }
+        if self.storing.is_some() {
+            return Err(Abort::DeviceState);
+        }
+        *self.storing = Some(request(group));
         Ok(())
     }
 
@@ -251,8 +291,10 @@ const fn is_application(index: u16) -> bool {
 const fn access(index: u16, subindex: u8) -> Access {
     match (index, subindex) {
         (0x1001, _) | (0x1003, 1..) => Access::ReadOnly,
-        (0x1003, 0) | (0x1005 | 0x1014 | 0x1015 | 0x1017 | 0x1019, _) => Access::ReadWrite,
-        (0x1016, 1..) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1..) => Access::ReadWrite,
+        (0x1003, 0) | (0x1005 | 0x1012 | 0x1014 | 0x1015 | 0x1017 | 0x1019, _) => Access::ReadWrite,
+        (0x1010 | 0x1011 | 0x1016 | 0x1029, 1..) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1..) => {
+            Access::ReadWrite
+        }
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, _) => Access::ReadWrite,
         _ => Access::Constant,
     }

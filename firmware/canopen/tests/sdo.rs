@@ -203,7 +203,7 @@ fn says_why_an_object_can_not_be_accessed() {
     let mut bench = Bench::pre_operational();
     assert_eq!(bench.read(0x3000, 0), Err(0x0602_0000));
     assert_eq!(bench.read(0x1F50, 1), Err(0x0602_0000));
-    assert_eq!(bench.read(0x1010, 1), Err(0x0602_0000));
+    assert_eq!(bench.read(0x1013, 1), Err(0x0602_0000));
     assert_eq!(bench.read(0x0005, 0), Err(0x0602_0000));
     assert_eq!(bench.read(0x2000, 9), Err(0x0609_0011));
     assert_eq!(bench.read(0x1000, 1), Err(0x0609_0011));

@@ -14,6 +14,9 @@ pub const HEAD_HEARTBEAT_MS: u16 = 100;
 pub const HEAD_HEARTBEAT_TIMEOUT_MS: u16 = 300;
 /// Time between two heartbeats of a vertebra in ms.
 pub const VERTEBRA_HEARTBEAT_MS: u16 = 200;
+/// Object 0x1029:1: a vertebra stays Operational when communication fails, as it lets go by itself
+/// and goes on telling how it is.
+pub const ERROR_BEHAVIOUR: u8 = 1;
 
 /// The node id of a vertebra: its position, 1 behind the head to 10 at the tail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,6 +3,7 @@
 use eel_canopen::EventQueue;
 use eel_kinematics::{Joints, Policy, Pose, PoseError};
 use eel_protocol::emergency::{Emergency, Severity, Source};
+use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
 use eel_units::{Angle, Instant, Torque};
 
@@ -10,6 +11,7 @@ use crate::command::{CommandStream, TARGET_TIMEOUT};
 use crate::current::{CurrentState, Electrical, Reading};
 use crate::encoder::{Encoder, EncoderFault};
 use crate::events::{EVENTS, Event};
+use crate::freezing::Clock;
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
 use crate::limits::{MotorBounds, Situation, bounds};
@@ -63,6 +65,14 @@ pub(crate) struct Core {
     pub timing: Timing,
     pub pending: Pending,
     pub events: EventQueue<Event, EVENTS>,
+    /// What was kept of the last fault or stop; outlives a reset of the node.
+    pub freeze: Option<FreezeFrame>,
+    /// Whether there was one since the scope looked last.
+    pub raised: bool,
+    /// The time of day, once TIME came; outlives a reset of the node.
+    pub clock: Option<Clock>,
+    /// Whether settings were stored and are lost, so that these are not the ones meant.
+    pub settings_lost: bool,
 }
 
 impl Core {
@@ -106,8 +116,18 @@ impl Core {
             timing: Timing::default(),
             pending: Pending::default(),
             events: EventQueue::default(),
+            freeze: None,
+            raised: false,
+            clock: None,
+            settings_lost: false,
             settings,
         }
+    }
+
+    /// Puts other settings in the place of those it was made with, before the first tick.
+    pub fn take_settings(&mut self, settings: Settings) {
+        self.impedance = Impedance::new(&settings.gains);
+        self.settings = settings;
     }
 
     /// Does one control tick.

@@ -1,7 +1,7 @@
 //! What a vertebra tells its platform, for logs and tests.
 
-use eel_protocol::State;
 use eel_protocol::emergency::{Emergency, Source};
+use eel_protocol::{NodeId, State};
 
 /// How many events wait to be polled.
 pub const EVENTS: usize = 16;
@@ -25,4 +25,7 @@ pub enum Event {
     },
     /// An NMT command reset the node; the vertebra starts anew.
     Reset,
+    /// LSS gave the vertebra another place in the chain, or took it away. A platform whose controller
+    /// filters identifiers must let the new ones pass.
+    NodeId(Option<NodeId>),
 }

@@ -1,9 +1,8 @@
-//! The vertebra's part of the object dictionary: reading and writing each field.
+//! The fields of the object dictionary that the core holds: reading and writing each.
 
-use eel_canopen::{Abort, Application, Entry};
-use eel_protocol::PoseReport;
-use eel_protocol::dictionary::{self, Field};
-use eel_units::{Angle, AngularVelocity, Duration, Instant, Temperature, Torque};
+use eel_canopen::Abort;
+use eel_protocol::dictionary::Field;
+use eel_units::{Angle, Duration, Instant, Temperature, Torque};
 
 use crate::core::Core;
 use crate::impedance::Impedance;
@@ -73,8 +72,7 @@ impl Timing {
 
 impl Core {
     /// Returns the raw number of a field; too large a one is saturated where it is encoded.
-    fn value(&self, field: Field) -> i64 {
-        let (gains, limits) = (&self.settings.gains, &self.settings.limits);
+    pub fn value(&self, field: Field) -> i64 {
         match field {
             Field::TargetYaw => i64::from(self.target.angles[0]),
             Field::TargetPitch => i64::from(self.target.angles[1]),
@@ -104,17 +102,17 @@ impl Core {
             Field::UnallocatedX => millis(self.unallocated[0]),
             Field::UnallocatedY => millis(self.unallocated[1]),
             Field::UnallocatedZ => millis(self.unallocated[2]),
-            Field::StiffnessX => i64::from(gains.stiffness[0]),
-            Field::StiffnessY => i64::from(gains.stiffness[1]),
-            Field::StiffnessZ => i64::from(gains.stiffness[2]),
-            Field::DampingX => i64::from(gains.damping[0]),
-            Field::DampingY => i64::from(gains.damping[1]),
-            Field::DampingZ => i64::from(gains.damping[2]),
-            Field::PeakTorque => millis(limits.peak_torque),
-            Field::RangeYaw => i64::from(limits.workspace.yaw.to_tenth_milliradians()),
-            Field::RangePitch => i64::from(limits.workspace.pitch.to_tenth_milliradians()),
-            Field::RangeRoll => i64::from(limits.workspace.roll.to_tenth_milliradians()),
-            Field::RateLimit => (i64::from(limits.rate.to_q24()) * 1_000 + (1 << 23)) >> 24,
+            Field::StiffnessX
+            | Field::StiffnessY
+            | Field::StiffnessZ
+            | Field::DampingX
+            | Field::DampingY
+            | Field::DampingZ
+            | Field::PeakTorque
+            | Field::RangeYaw
+            | Field::RangePitch
+            | Field::RangeRoll
+            | Field::RateLimit => self.settings.value(field).unwrap_or_default(),
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
             Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
@@ -129,6 +127,20 @@ impl Core {
             Field::LoopLast => i64::from(self.timing.loop_last.to_micros()),
             Field::LoopMax => i64::from(self.timing.loop_max.to_micros()),
             Field::SyncPhase => self.timing.sync_phase_us,
+            // The rest is served beside the core, or streams.
+            Field::ScopeChannel1
+            | Field::ScopeChannel2
+            | Field::ScopeChannel3
+            | Field::ScopeChannel4
+            | Field::ScopeDivider
+            | Field::ScopeTrigger
+            | Field::ScopeState
+            | Field::ScopeSamples
+            | Field::RecordFreeze
+            | Field::RecordScope
+            | Field::LinkData
+            | Field::LinkLength
+            | Field::LinkCrc => 0,
         }
     }
 
@@ -146,7 +158,7 @@ impl Core {
     }
 
     /// Writes a field whose value has been held against its bounds.
-    fn set(&mut self, field: Field, value: i64) -> Result<(), Abort> {
+    pub fn set(&mut self, field: Field, value: i64) -> Result<(), Abort> {
         match field {
             Field::TargetYaw => self.target.angles[0] = value as i16,
             Field::TargetPitch => self.target.angles[1] = value as i16,
@@ -167,72 +179,11 @@ impl Core {
         if self.machine.is_live() || self.operational {
             return Err(Abort::DeviceState);
         }
-        let angle = Angle::from_tenth_milliradians(value as i16);
-        let (gains, limits) = (&mut self.settings.gains, &mut self.settings.limits);
-        match field {
-            Field::StiffnessX => gains.stiffness[0] = value as u32,
-            Field::StiffnessY => gains.stiffness[1] = value as u32,
-            Field::StiffnessZ => gains.stiffness[2] = value as u32,
-            Field::DampingX => gains.damping[0] = value as u32,
-            Field::DampingY => gains.damping[1] = value as u32,
-            Field::DampingZ => gains.damping[2] = value as u32,
-            Field::PeakTorque => limits.peak_torque = torque(value),
-            Field::RangeYaw => limits.workspace.yaw = angle,
-            Field::RangePitch => limits.workspace.pitch = angle,
-            Field::RangeRoll => limits.workspace.roll = angle,
-            Field::RateLimit => {
-                limits.rate = AngularVelocity::from_milliradians_per_second(value as i32);
-            }
-            _ => return Err(Abort::ReadOnly),
+        if !self.settings.set(field, value) {
+            return Err(Abort::ReadOnly);
         }
         self.impedance = Impedance::new(&self.settings.gains);
         Ok(())
-    }
-}
-
-impl Application for Core {
-    fn entry(&self, index: u16, subindex: u8) -> Result<Entry, Abort> {
-        dictionary::entry(index, subindex)
-    }
-
-    fn read(&self, index: u16, subindex: u8, out: &mut [u8]) -> Result<usize, Abort> {
-        if subindex == 0 {
-            let object = dictionary::object(index).ok_or(Abort::NoObject)?;
-            *out.first_mut().ok_or(Abort::OutOfMemory)? = object.highest();
-            return Ok(1);
-        }
-        let (_, sub) = dictionary::find(index, subindex)?;
-        sub.data_type.encode(self.value(sub.field), out)
-    }
-
-    fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
-        let (_, sub) = dictionary::find(index, subindex)?;
-        self.set(sub.field, sub.accept(data)?)
-    }
-
-    fn rpdo_applied(&mut self, number: u8, cob_id: u16) {
-        match number {
-            1 => {
-                let bytes = self.target.to_bytes();
-                self.receive_target(&bytes, cob_id);
-            }
-            2 => self.receive_feed_forward(),
-            _ => {}
-        }
-    }
-
-    fn tpdo_due(&mut self, number: u8, cob_id: u16) {
-        if number == 1 {
-            let report = PoseReport {
-                yaw: self.pose.yaw,
-                pitch: self.pose.pitch,
-                roll: self.pose.roll,
-                state: self.machine.state(),
-                counter: self.pose_counter,
-            };
-            self.pose_counter = self.pose_counter.next();
-            self.pose_bytes = report.to_bytes(cob_id);
-        }
     }
 }
 
@@ -248,6 +199,6 @@ fn torque(value: i64) -> Torque {
     Torque::from_millinewton_metres(value as i32)
 }
 
-fn microradians(angle: Angle) -> i64 {
+pub(crate) fn microradians(angle: Angle) -> i64 {
     (i64::from(angle.to_q29()) * MICRO + (1 << 28)) >> 29
 }

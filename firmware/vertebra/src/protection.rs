@@ -57,7 +57,10 @@ impl Core {
             sample.supply <= limits.supply_low.end || sample.supply >= limits.supply_high.end;
         self.status = self
             .status
-            .with(Condition::Settings, !self.settings.are_sound())
+            .with(
+                Condition::Settings,
+                self.settings_lost || !self.settings.are_sound(),
+            )
             .with(Condition::Encoders, !aligned)
             .with(Condition::Pose, aligned && !believable)
             .with(Condition::Voltage, voltage)
@@ -154,6 +157,7 @@ impl Core {
         let before = self.machine.state();
         let motor = usize::from(source.motor).checked_sub(1);
         if self.machine.fault(self.now, motor) {
+            self.freeze(before, emergency, source);
             self.emit(emergency, source);
         }
         self.note_state(before);
@@ -176,8 +180,9 @@ impl Core {
     pub fn stop(&mut self, emergency: Emergency, detail: u32) {
         let before = self.machine.state();
         if self.machine.stop(self.now) {
-            let detail = detail.min(0xFFFF) as u16;
-            self.emit(emergency, Source::whole(detail));
+            let source = Source::whole(detail.min(0xFFFF) as u16);
+            self.freeze(before, emergency, source);
+            self.emit(emergency, source);
         }
         self.note_state(before);
     }
@@ -194,6 +199,7 @@ impl Core {
     pub fn emergency_stop(&mut self, emergency: Emergency) {
         let before = self.machine.state();
         if self.machine.emergency_stop(self.now) {
+            self.freeze(before, emergency, Source::WHOLE);
             self.emit(emergency, Source::WHOLE);
         }
         self.note_state(before);
@@ -209,10 +215,12 @@ impl Core {
     }
 
     /// Lets go because the head's heartbeat is missing; the node sends the emergency itself.
-    pub fn lose_head(&mut self) {
+    pub fn lose_head(&mut self, node: u8) {
         let before = self.machine.state();
         self.status = self.status.with(Condition::HeadLost, true);
-        self.machine.stop(self.now);
+        if self.machine.stop(self.now) {
+            self.freeze(before, Emergency::HEAD_LOST, Source::whole(u16::from(node)));
+        }
         self.note_state(before);
     }
 

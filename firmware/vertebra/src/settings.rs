@@ -12,8 +12,8 @@ use crate::current::{RESISTANCES, TORQUE_CONSTANTS};
 /// Everything that is set for one vertebra.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Its place in the chain.
-    pub node: NodeId,
+    /// Its place in the chain, until LSS stores another; without one it only listens to LSS.
+    pub node: Option<NodeId>,
     /// The unique number of its microcontroller, object 0x1018:4.
     pub serial: u32,
     /// What its board calls itself, object 0x1009.
@@ -96,8 +96,15 @@ pub struct Motor {
 impl Settings {
     /// Returns the settings of the prototype for the vertebra `node` with the board `serial`.
     pub const fn prototype(node: NodeId, serial: u32) -> Self {
+        let mut settings = Self::unconfigured(serial);
+        settings.node = Some(node);
+        settings
+    }
+
+    /// Returns the settings of a prototype that knows no place in the chain.
+    pub const fn unconfigured(serial: u32) -> Self {
         Self {
-            node,
+            node: None,
             serial,
             hardware: "prototype",
             wrist: Wrist::PAPER,
@@ -148,6 +155,56 @@ impl Settings {
             && counts_per_turn > 0
             && self.motor.current_limit > Current::ZERO
             && self.motor.speed_limit > AngularVelocity::ZERO
+    }
+}
+
+/// The settings as the entries of the dictionary that may be written and stored.
+impl Settings {
+    /// Returns the raw number of a setting; `None` for any other field.
+    pub(crate) fn value(&self, field: Field) -> Option<i64> {
+        let (gains, limits) = (&self.gains, &self.limits);
+        let [stiffness_x, stiffness_y, stiffness_z] = gains.stiffness.map(i64::from);
+        let [damping_x, damping_y, damping_z] = gains.damping.map(i64::from);
+        let angle = |angle: Angle| i64::from(angle.to_tenth_milliradians());
+        Some(match field {
+            Field::StiffnessX => stiffness_x,
+            Field::StiffnessY => stiffness_y,
+            Field::StiffnessZ => stiffness_z,
+            Field::DampingX => damping_x,
+            Field::DampingY => damping_y,
+            Field::DampingZ => damping_z,
+            Field::PeakTorque => i64::from(limits.peak_torque.to_millinewton_metres()),
+            Field::RangeYaw => angle(limits.workspace.yaw),
+            Field::RangePitch => angle(limits.workspace.pitch),
+            Field::RangeRoll => angle(limits.workspace.roll),
+            Field::RateLimit => (i64::from(limits.rate.to_q24()) * 1_000 + (1 << 23)) >> 24,
+            _ => return None,
+        })
+    }
+
+    /// Writes a setting whose value has been held against its bounds. Tells whether the field is one.
+    pub(crate) fn set(&mut self, field: Field, value: i64) -> bool {
+        let angle = Angle::from_tenth_milliradians(value as i16);
+        let (gains, limits) = (&mut self.gains, &mut self.limits);
+        match field {
+            Field::StiffnessX => gains.stiffness[0] = value as u32,
+            Field::StiffnessY => gains.stiffness[1] = value as u32,
+            Field::StiffnessZ => gains.stiffness[2] = value as u32,
+            Field::DampingX => gains.damping[0] = value as u32,
+            Field::DampingY => gains.damping[1] = value as u32,
+            Field::DampingZ => gains.damping[2] = value as u32,
+            Field::PeakTorque => {
+                limits.peak_torque = Torque::from_millinewton_metres(value as i32);
+            }
+            Field::RangeYaw => limits.workspace.yaw = angle,
+            Field::RangePitch => limits.workspace.pitch = angle,
+            Field::RangeRoll => limits.workspace.roll = angle,
+            Field::RateLimit => {
+                limits.rate = AngularVelocity::from_milliradians_per_second(value as i32);
+            }
+            _ => return false,
+        }
+        true
     }
 }
 

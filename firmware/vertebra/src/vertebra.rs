@@ -1,24 +1,44 @@
 //! The vertebra as its platform sees it.
 
-use eel_canopen::{Config, Frame, Identity, NmtCommand, NmtState, Node};
+use eel_canopen::{Config, Frame, Identity, NmtCommand, NmtState, Node, StoreRequest};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
-use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status, VERTEBRAE};
-use eel_protocol::{SYNC_COUNTER_OVERFLOW, VERTEBRA_HEARTBEAT_MS, identity, pdo};
+use eel_protocol::freeze::TimeOfDay;
+use eel_protocol::{
+    Cob, ERROR_BEHAVIOUR, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status,
+};
+use eel_protocol::{SYNC_COUNTER_OVERFLOW, VERTEBRA_HEARTBEAT_MS, VERTEBRAE, identity, pdo};
 use eel_units::{Angle, Duration, Instant};
 
 use crate::core::Core;
 use crate::events::Event;
+use crate::freezing::Clock;
 use crate::io::{Drive, Sample};
+use crate::records::Records;
+use crate::served::Served;
 use crate::settings::Settings;
+use crate::store::{Record, Stored};
 
 /// One vertebra: frames and samples in, drives and frames out.
 #[derive(Clone, Debug)]
 pub struct Vertebra {
-    node: Node,
-    core: Core,
-    /// What NMT "reset node" goes back to.
+    pub(crate) node: Node,
+    pub(crate) core: Core,
+    pub(crate) records: Records,
+    /// What the platform made it with, before what is stored.
     settings: Settings,
+    pub(crate) storing: Storing,
+}
+
+/// What NMT "reset node" goes back to, and what is to become it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Storing {
+    /// What is stored.
+    pub stored: Record,
+    /// What the bus has asked for, and the platform has not taken yet.
+    pub asked: Option<StoreRequest>,
+    /// What the platform is about to store.
+    pub coming: Option<Record>,
 }
 
 /// Does one turn: all frames in their order, the sample, then everything that is to be sent.
@@ -41,20 +61,47 @@ pub fn turn(
 }
 
 impl Vertebra {
-    /// Starts a vertebra at power-up: drives off, boot-up message waiting.
+    /// Starts a vertebra at power-up that has nothing stored: drives off, boot-up message waiting.
     pub fn new(settings: Settings, now: Instant) -> Self {
-        let core = Core::new(settings, now);
-        Self {
-            node: Node::new(config(&settings), &[], &core, now.to_micros()),
+        Self::with_stored(settings, &Stored::Nothing, now)
+    }
+
+    /// Starts a vertebra at power-up with what its flash holds. What is stored outranks the settings;
+    /// what was stored and is lost is a fault until it is stored again or restored.
+    pub fn with_stored(settings: Settings, stored: &Stored, now: Instant) -> Self {
+        let (record, is_damaged) = match stored {
+            Stored::Nothing => (Record::default(), false),
+            Stored::Record(record) => (record.clone(), record.lost),
+            Stored::Damaged => (Record::default(), true),
+        };
+        let mut core = Core::new(settings, now);
+        let mut records = Records::new();
+        let served = Served {
+            core: &mut core,
+            records: &mut records,
+        };
+        let config = config(&settings, record.node);
+        let node = Node::new(config, &record.communication, &served, now.to_micros());
+        let is_refused = node.has_refused_stored();
+        let mut vertebra = Self {
+            node,
             core,
+            records,
             settings,
-        }
+            storing: Storing {
+                stored: record,
+                ..Storing::default()
+            },
+        };
+        vertebra.core.settings_lost = is_damaged || is_refused;
+        vertebra.take_settings();
+        vertebra
     }
 
     /// Starts a vertebra whose microcontroller ended by a watchdog, a panic or a fault: as at
     /// power-up, but stopped until a fault reset.
-    pub fn after_failure(settings: Settings, now: Instant) -> Self {
-        let mut vertebra = Self::new(settings, now);
+    pub fn after_failure(settings: Settings, stored: &Stored, now: Instant) -> Self {
+        let mut vertebra = Self::with_stored(settings, stored, now);
         vertebra.core.emergency_stop(Emergency::RESTARTED);
         vertebra
     }
@@ -62,8 +109,11 @@ impl Vertebra {
     /// Takes a frame from the bus.
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         self.core.now = now;
-        self.node
-            .handle_frame(now.to_micros(), frame, &mut self.core);
+        let mut served = Served {
+            core: &mut self.core,
+            records: &mut self.records,
+        };
+        self.node.handle_frame(now.to_micros(), frame, &mut served);
         self.absorb_events(now);
         self.hand_over_emergencies(now);
     }
@@ -72,9 +122,18 @@ impl Vertebra {
     /// bridges do until the next.
     pub fn handle_sample(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
         self.core.now = now;
-        self.node.tick(now.to_micros(), &mut self.core);
+        let mut served = Served {
+            core: &mut self.core,
+            records: &mut self.records,
+        };
+        self.node.tick(now.to_micros(), &mut served);
         self.absorb_events(now);
         let drives = self.core.tick(now, sample);
+        let mut served = Served {
+            core: &mut self.core,
+            records: &mut self.records,
+        };
+        served.capture();
         self.hand_over_emergencies(now);
         drives
     }
@@ -94,9 +153,9 @@ impl Vertebra {
         self.core.events.dropped()
     }
 
-    /// Returns the place in the chain.
-    pub fn node_id(&self) -> NodeId {
-        self.core.settings.node
+    /// Returns the place in the chain; `None` before LSS gives one.
+    pub fn node_id(&self) -> Option<NodeId> {
+        NodeId::new(self.node.node_id())
     }
 
     /// Returns the state.
@@ -152,7 +211,17 @@ impl Vertebra {
             match event {
                 eel_canopen::Event::Nmt { command, state } => self.follow_nmt(now, command, state),
                 eel_canopen::Event::Sync { .. } => self.core.synchronise(now),
-                eel_canopen::Event::HeartbeatLost(_) => self.core.lose_head(),
+                eel_canopen::Event::HeartbeatLost(node) => self.core.lose_head(node),
+                eel_canopen::Event::Time { days, ms } => {
+                    self.core.clock = Some(Clock {
+                        time: TimeOfDay { days, ms },
+                        told: now,
+                    });
+                }
+                eel_canopen::Event::Store(request) => self.storing.asked = Some(request),
+                eel_canopen::Event::NodeId(id) => {
+                    self.core.events.push(Event::NodeId(NodeId::new(id)));
+                }
                 // A consumer that was reset meanwhile only tells that it heard something.
                 eel_canopen::Event::HeartbeatBack(_) | eel_canopen::Event::RemoteState { .. } => {
                     self.core.hear_head();
@@ -165,7 +234,17 @@ impl Vertebra {
     fn follow_nmt(&mut self, now: Instant, command: NmtCommand, state: NmtState) {
         if command == NmtCommand::ResetNode {
             let was_latched = self.core.machine.state().is_latched();
+            let Core {
+                freeze,
+                clock,
+                settings_lost,
+                ..
+            } = self.core;
             self.core = Core::new(self.settings, now);
+            self.core.freeze = freeze;
+            self.core.clock = clock;
+            self.core.settings_lost = settings_lost;
+            self.take_settings();
             self.core.events.push(Event::Reset);
             if was_latched {
                 self.core.emergency_stop(Emergency::RESTARTED);
@@ -176,6 +255,16 @@ impl Vertebra {
             NmtCommand::Stop => self.core.latch_stop(),
             _ if !self.core.operational => self.core.stop(Emergency::STOPPED_BY_NMT, 0),
             _ => {}
+        }
+    }
+
+    /// Takes the stored settings over.
+    fn take_settings(&mut self) {
+        let mut settings = self.settings;
+        if self.storing.stored.apply_settings(&mut settings) {
+            self.core.take_settings(settings);
+        } else {
+            self.core.settings_lost = true;
         }
     }
 
@@ -193,10 +282,14 @@ impl Vertebra {
     }
 }
 
-/// Returns the node's configuration for these settings.
-fn config(settings: &Settings) -> Config {
+/// Stands for no node id.
+const UNCONFIGURED: u8 = 0xFF;
+
+/// Returns the node's configuration for these settings; the place that is stored outranks theirs.
+fn config(settings: &Settings, stored: Option<NodeId>) -> Config {
+    let node = stored.or(settings.node);
     Config {
-        node_id: settings.node.get(),
+        node_id: node.map_or(UNCONFIGURED, NodeId::get),
         node_ids: (NodeId::FIRST.get(), VERTEBRAE),
         identity: Identity {
             vendor: identity::VENDOR,
@@ -210,11 +303,10 @@ fn config(settings: &Settings) -> Config {
         software_version: identity::SOFTWARE_VERSION,
         heartbeat_ms: VERTEBRA_HEARTBEAT_MS,
         consumer: Some((HEAD_NODE, HEAD_HEARTBEAT_TIMEOUT_MS)),
-        sync_cob_id: 0x080,
+        sync_cob_id: Cob::Sync.id(),
         sync_counter_overflow: SYNC_COUNTER_OVERFLOW,
-        time_cob_id: 0x100,
-        // The vertebra lets go by itself, and goes on telling how it is.
-        error_behaviour: 1,
+        time_cob_id: Cob::Time.id(),
+        error_behaviour: ERROR_BEHAVIOUR,
         rpdos: pdo::RPDOS,
         tpdos: pdo::TPDOS,
     }

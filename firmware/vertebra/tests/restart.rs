@@ -8,6 +8,7 @@ use eel_protocol::emergency::Emergency;
 use eel_protocol::{Frame, Mode, Moment, State};
 use eel_units::{Angle, Current, Torque};
 use eel_vertebra::Vertebra;
+use eel_vertebra::store::Stored;
 
 use support::{Bench, node, pose, stays_off};
 
@@ -15,7 +16,7 @@ use support::{Bench, node, pose, stays_off};
 fn a_failure_of_its_processor_needs_a_fault_reset() {
     let mut bench = Bench::new();
     let settings = eel_vertebra::Settings::prototype(node(), 7);
-    bench.vertebra = Vertebra::after_failure(settings, bench.now());
+    bench.vertebra = Vertebra::after_failure(settings, &Stored::Nothing, bench.now());
     bench.nmt(NmtCommand::Start);
     bench.run(400);
     assert_eq!(bench.state(), State::StopOff);

@@ -125,3 +125,73 @@ fn a_bus_that_ends_ends_the_run() {
     drop(bus);
     assert!(matches!(nodes.run(|_| true), Err(BusError::Ended)));
 }
+
+/// Switches the vertebra with this serial number to configuration, gives it an id, stores it, and
+/// switches it back; returns all answers.
+fn give_id(
+    nodes: &mut Realtime<MemoryBus>,
+    bus: &mut MemoryBus,
+    serial: u32,
+    id: u8,
+) -> Vec<[u8; 8]> {
+    let word = |command: u8, value: u32| {
+        let [a, b, c, d] = value.to_le_bytes();
+        [command, a, b, c, d, 0, 0, 0]
+    };
+    let requests = [
+        word(0x40, identity::VENDOR),
+        word(0x41, identity::PRODUCT),
+        word(0x42, identity::REVISION),
+        word(0x43, serial),
+        [0x11, id, 0, 0, 0, 0, 0, 0],
+        [0x17, 0, 0, 0, 0, 0, 0, 0],
+        [0x04, 0, 0, 0, 0, 0, 0, 0],
+    ];
+    let mut answers = Vec::new();
+    for request in requests {
+        send(bus, Cob::LssRequest, &request);
+        let seen = ticks(nodes, bus, 3).into_iter();
+        answers.extend(
+            seen.filter(|frame| frame.cob_id() == Some(Cob::LssResponse.id()))
+                .map(|frame| <[u8; 8]>::try_from(frame.data()).unwrap()),
+        );
+    }
+    answers
+}
+
+#[test]
+fn an_unconfigured_vertebra_is_silent_until_it_is_given_an_id_which_it_keeps() {
+    let (ours, mut bus) = pair();
+    let place = |number| NodeId::new(number).unwrap();
+    let (configured, unconfigured) = ([place(1), place(5)], [place(3), place(5)]);
+    let plant = PlantConfig::default();
+    let mut nodes = Realtime::with_unconfigured(ours, &plant, 1, &configured, &unconfigured);
+    let seen = ticks(&mut nodes, &mut bus, 500);
+    let heartbeat = Cob::Heartbeat(1).id();
+    assert!(seen.iter().all(|frame| frame.cob_id() == Some(heartbeat)));
+
+    let serial = 0x5EE1_0003;
+    let answers = give_id(&mut nodes, &mut bus, serial, 3);
+    let expected = [
+        [0x44, 0, 0, 0, 0, 0, 0, 0],
+        [0x11, 0, 0, 0, 0, 0, 0, 0],
+        [0x17, 0, 0, 0, 0, 0, 0, 0],
+    ];
+    assert_eq!(answers, expected);
+    let seen = ticks(&mut nodes, &mut bus, 250);
+    assert!(
+        seen.contains(&Frame::standard(Cob::Heartbeat(3).id(), &[0x7F]).unwrap()),
+        "it beats as node 3"
+    );
+
+    // The flash keeps the id over a loss of power, which the node does not see coming.
+    let now = Instant::from_micros(nodes.counters().ticks * 1_000);
+    let (_, node) = nodes.nodes.get_mut(1).unwrap();
+    node.reset(now);
+    let boot_up = Frame::standard(Cob::Heartbeat(3).id(), &[0]).unwrap();
+    assert!(ticks(&mut nodes, &mut bus, 2).contains(&boot_up));
+
+    // An id beyond the chain is refused, with the code for it.
+    let answers = give_id(&mut nodes, &mut bus, 0x5EE1_0005, 11);
+    assert_eq!(answers[1], [0x11, 1, 0, 0, 0, 0, 0, 0]);
+}

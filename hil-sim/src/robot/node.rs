@@ -2,6 +2,7 @@
 
 use eel_protocol::{Frame, NodeId, State};
 use eel_units::Instant;
+use eel_vertebra::store::{self, RamFlash, Store};
 use eel_vertebra::{Drive, Event, Sample, Settings, Vertebra, turn};
 
 /// Everything that went into a turn and came out of it.
@@ -45,10 +46,11 @@ pub trait Node {
     }
 }
 
-/// A vertebra in this process.
+/// A vertebra in this process. Its flash lasts as long as it does, over every reset.
 #[derive(Debug)]
 pub struct NativeNode {
     settings: Settings,
+    store: Store<RamFlash>,
     vertebra: Vertebra,
 }
 
@@ -58,10 +60,19 @@ impl NativeNode {
         Self::with_settings(prototype(id))
     }
 
-    /// Powers a vertebra with these settings up.
+    /// Powers a prototype up that has no node id, at the place `id` in the chain.
+    pub fn unconfigured(id: NodeId) -> Self {
+        Self::with_settings(Settings {
+            node: None,
+            ..prototype(id)
+        })
+    }
+
+    /// Powers a vertebra with these settings and an empty flash up.
     pub fn with_settings(settings: Settings) -> Self {
         Self {
             settings,
+            store: Store::new(RamFlash::new()),
             vertebra: Vertebra::new(settings, Instant::ZERO),
         }
     }
@@ -81,13 +92,15 @@ impl Node for NativeNode {
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3] {
         let frames = frames.iter().copied();
-        turn(&mut self.vertebra, now, frames, sample, |frame| {
+        let drives = turn(&mut self.vertebra, now, frames, sample, |frame| {
             sent.push(frame);
-        })
+        });
+        store::serve(&mut self.vertebra, &mut self.store, now);
+        drives
     }
 
     fn reset(&mut self, now: Instant) {
-        self.vertebra = Vertebra::new(self.settings, now);
+        self.vertebra = Vertebra::with_stored(self.settings, &self.store.load(), now);
     }
 
     fn vertebra(&self) -> Option<&Vertebra> {

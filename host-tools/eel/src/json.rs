@@ -2,15 +2,14 @@
 
 use std::fmt::Display;
 
-use eel_protocol::Cob;
 use eel_transport::candump::Direction;
-use eel_transport::{Content, ErrorFrame, Received, frame_bits};
+use eel_transport::{Content, ErrorFrame, frame_bits};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::decode::{Decoded, physical};
 use crate::filter::Filter;
-use crate::sdo::{Sdo, Side};
-use crate::text::ErrorWords;
+use crate::service::Service;
+use crate::text::{ErrorWords, Seen};
 
 /// The schema, for `--help`.
 pub const SCHEMA: &str = "\
@@ -19,13 +18,13 @@ JSON lines, one object a frame. Always: time_s (number, s), id (number), extende
 and interframe space), message (string: nmt, sync, emergency, pose, target, effort, moment,
 heartbeat, sdo-request, sdo-response, lss-request, lss-response, time, unknown). Where they apply:
 node (number), signals (object: name to number in SI units, or to the name of a code), text
-(string: an SDO in words), problem (string), direction (\"received\" or \"transmitted\").
+(string: an SDO, LSS or TIME in words), problem (string), direction (\"received\" or \"transmitted\").
 An error report of the interface: time_s, error (string), classes (number), data.";
 
 /// What was received, to be written as JSON.
 pub struct Line<'a> {
     /// What was received.
-    pub received: &'a Received,
+    pub seen: Seen<'a>,
     /// Which signals are written.
     pub filter: &'a Filter,
 }
@@ -33,8 +32,8 @@ pub struct Line<'a> {
 impl Serialize for Line<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry("time_s", &(self.received.time_ns as f64 / 1e9))?;
-        match &self.received.content {
+        map.serialize_entry("time_s", &(self.seen.received.time_ns as f64 / 1e9))?;
+        match &self.seen.received.content {
             Content::Frame(frame) => self.frame(&mut map, &Decoded::of(frame))?,
             Content::Error(error) => report(&mut map, error)?,
         }
@@ -63,24 +62,13 @@ impl Line<'_> {
                 },
             )?;
         }
-        let side = match decoded.cob {
-            Some(Cob::SdoRequest(_)) => Some(Side::Request),
-            Some(Cob::SdoResponse(_)) => Some(Side::Response),
-            _ => None,
-        };
-        if let Some(side) = side.filter(|_| !frame.is_remote()) {
-            map.serialize_entry(
-                "text",
-                &Text(Sdo {
-                    side,
-                    data: frame.data(),
-                }),
-            )?;
+        if let Some(service) = Service::of(decoded, self.seen.is_segment) {
+            map.serialize_entry("text", &Text(service))?;
         }
         if let Some(problem) = decoded.problem {
             map.serialize_entry("problem", &Text(problem))?;
         }
-        match self.received.direction {
+        match self.seen.received.direction {
             None => Ok(()),
             Some(Direction::Received) => map.serialize_entry("direction", "received"),
             Some(Direction::Transmitted) => map.serialize_entry("direction", "transmitted"),
@@ -138,6 +126,7 @@ impl Serialize for Signals<'_> {
 #[cfg(test)]
 mod tests {
     use eel_protocol::Frame;
+    use eel_transport::Received;
     use serde_json::json;
 
     use super::*;
@@ -150,7 +139,10 @@ mod tests {
             direction: None,
         };
         serde_json::to_value(Line {
-            received: &received,
+            seen: Seen {
+                received: &received,
+                is_segment: false,
+            },
             filter: &Filter::default(),
         })
         .unwrap()

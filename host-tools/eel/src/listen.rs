@@ -6,12 +6,13 @@ use std::io::{BufWriter, Result, Write};
 use eel_transport::candump::{self, Record};
 use eel_transport::{Content, Received};
 
+use crate::channels::Channels;
 use crate::decode::Decoded;
 use crate::filter::Filter;
 use crate::json;
 use crate::source::Sink;
 use crate::stats::Statistics;
-use crate::text::Look;
+use crate::text::{Look, Seen};
 
 /// The form of the lines.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +35,7 @@ pub struct Listener<W: Write> {
     out: W,
     form: Form,
     filter: Filter,
+    channels: Channels,
     origin_ns: Option<u64>,
     recording: Option<Recording>,
     statistics: Option<Statistics>,
@@ -108,11 +110,12 @@ impl Recording {
 
 impl<W: Write> Listener<W> {
     /// Makes a listener that writes to `out`.
-    pub const fn new(out: W, form: Form, filter: Filter) -> Self {
+    pub fn new(out: W, form: Form, filter: Filter) -> Self {
         Self {
             out,
             form,
             filter,
+            channels: Channels::default(),
             origin_ns: None,
             recording: None,
             statistics: None,
@@ -140,8 +143,8 @@ impl<W: Write> Listener<W> {
         self.statistics
     }
 
-    fn show(&mut self, received: &Received) -> Result<()> {
-        let origin_ns = *self.origin_ns.get_or_insert(received.time_ns);
+    fn show(&mut self, seen: Seen<'_>) -> Result<()> {
+        let origin_ns = *self.origin_ns.get_or_insert(seen.received.time_ns);
         match self.form {
             Form::Text {
                 colour,
@@ -154,11 +157,11 @@ impl<W: Write> Listener<W> {
                     raw,
                     origin_ns,
                 };
-                look.line(&mut self.out, received, &self.filter)
+                look.line(&mut self.out, &seen, &self.filter)
             }
             Form::Json => {
                 let line = json::Line {
-                    received,
+                    seen,
                     filter: &self.filter,
                 };
                 serde_json::to_writer(&mut self.out, &line)?;
@@ -177,8 +180,10 @@ impl<W: Write> Sink for Listener<W> {
             statistics.add(received);
         }
         self.origin_ns.get_or_insert(received.time_ns);
+        let mut is_segment = false;
         let is_shown = match &received.content {
             Content::Frame(frame) => {
+                is_segment = self.channels.is_segment(frame);
                 let decoded = Decoded::of(frame);
                 self.problems += u64::from(decoded.problem.is_some());
                 self.filter.passes(&decoded)
@@ -189,7 +194,10 @@ impl<W: Write> Sink for Listener<W> {
             }
         };
         if is_shown {
-            self.show(received)
+            self.show(Seen {
+                received,
+                is_segment,
+            })
         } else {
             Ok(())
         }

@@ -1,13 +1,16 @@
 //! The `eel` command: what is on the bus, in words and numbers, and what the wrist answers.
 
+mod channels;
 mod cli;
 mod decode;
 mod export;
 mod filter;
 mod json;
 mod listen;
+mod lss;
 mod report;
 mod sdo;
+mod service;
 mod source;
 mod stats;
 mod text;

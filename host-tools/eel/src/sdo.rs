@@ -22,6 +22,8 @@ pub struct Sdo<'a> {
     pub side: Side,
     /// Its eight bytes.
     pub data: &'a [u8],
+    /// Whether it is a bare segment of a block transfer.
+    pub is_segment: bool,
 }
 
 impl fmt::Display for Sdo<'_> {
@@ -29,6 +31,9 @@ impl fmt::Display for Sdo<'_> {
         let &[command, low, high, subindex, a, b, c, d] = self.data else {
             return write!(out, "an SDO has 8 bytes");
         };
+        if self.is_segment {
+            return self.block_segment(out, command);
+        }
         let object = Object {
             index: u16::from_le_bytes([low, high]),
             subindex,
@@ -49,14 +54,30 @@ impl fmt::Display for Sdo<'_> {
             (Side::Response, 3) => write!(out, "written {object}"),
             (Side::Request, 0) | (Side::Response, 0) => self.segment(out, command),
             (Side::Request, 3) | (Side::Response, 1) => write!(out, "segment, please go on"),
-            (Side::Request, 5) | (Side::Response, 6) => write!(out, "block upload"),
-            (Side::Request, 6) | (Side::Response, 5) => write!(out, "block download"),
+            (Side::Request, 5) => read_in_blocks(out, object, command, low, [a, b, c, d]),
+            (Side::Request, 6) => write_in_blocks(out, object, command, [low, high], [a, b, c, d]),
+            (Side::Response, 5) => take_in_blocks(out, object, command, [low, high], a),
+            (Side::Response, 6) => give_in_blocks(out, object, command, [low, high], [a, b, c, d]),
             _ => write!(out, "unknown command 0x{command:02X}"),
         }
     }
 }
 
 impl Sdo<'_> {
+    /// Prints a segment of a block transfer.
+    fn block_segment(&self, out: &mut fmt::Formatter<'_>, number: u8) -> fmt::Result {
+        let last = if number & 0x80 != 0 {
+            "last block"
+        } else {
+            "block"
+        };
+        write!(out, "{last} segment {}", number & 0x7F)?;
+        let bytes = self.data.iter().skip(1);
+        bytes
+            .into_iter()
+            .try_for_each(|byte| write!(out, " {byte:02X}"))
+    }
+
     /// Prints a segment's bytes.
     fn segment(&self, out: &mut fmt::Formatter<'_>, command: u8) -> fmt::Result {
         let length = 7 - usize::from((command >> 1) & 7);
@@ -72,6 +93,89 @@ impl Sdo<'_> {
             .take(length)
             .try_for_each(|byte| write!(out, " {byte:02X}"))
     }
+}
+
+/// A client that uploads in blocks.
+fn read_in_blocks(
+    out: &mut fmt::Formatter<'_>,
+    object: Object,
+    command: u8,
+    received: u8,
+    [size, ..]: [u8; 4],
+) -> fmt::Result {
+    match command & 3 {
+        0 => write!(out, "read {object} in blocks of {size} segments"),
+        1 => write!(out, "block transfer ends"),
+        2 => write!(
+            out,
+            "block received up to segment {received}, next of {} segments",
+            object.index >> 8
+        ),
+        _ => write!(out, "blocks, please"),
+    }
+}
+
+/// A client that downloads in blocks.
+fn write_in_blocks(
+    out: &mut fmt::Formatter<'_>,
+    object: Object,
+    command: u8,
+    crc: [u8; 2],
+    size: [u8; 4],
+) -> fmt::Result {
+    if command & 1 != 0 {
+        return end_of_blocks(out, command, crc);
+    }
+    write!(out, "write {object} in blocks")?;
+    size_in_blocks(out, command, size)
+}
+
+/// A server that takes blocks.
+fn take_in_blocks(
+    out: &mut fmt::Formatter<'_>,
+    object: Object,
+    command: u8,
+    [received, next]: [u8; 2],
+    size: u8,
+) -> fmt::Result {
+    match command & 3 {
+        0 => write!(out, "{object} in blocks of {size} segments, please"),
+        1 => write!(out, "written in blocks"),
+        _ => write!(
+            out,
+            "block received up to segment {received}, next of {next} segments"
+        ),
+    }
+}
+
+/// A server that gives blocks.
+fn give_in_blocks(
+    out: &mut fmt::Formatter<'_>,
+    object: Object,
+    command: u8,
+    crc: [u8; 2],
+    size: [u8; 4],
+) -> fmt::Result {
+    if command & 1 != 0 {
+        return end_of_blocks(out, command, crc);
+    }
+    write!(out, "answer {object} in blocks")?;
+    size_in_blocks(out, command, size)
+}
+
+fn size_in_blocks(out: &mut fmt::Formatter<'_>, command: u8, size: [u8; 4]) -> fmt::Result {
+    if command & 2 == 0 {
+        return Ok(());
+    }
+    write!(out, ", {} bytes", u32::from_le_bytes(size))
+}
+
+fn end_of_blocks(out: &mut fmt::Formatter<'_>, command: u8, crc: [u8; 2]) -> fmt::Result {
+    let (unused, crc) = (command >> 2 & 7, u16::from_le_bytes(crc));
+    write!(
+        out,
+        "blocks end, {unused} bytes of the last segment unused, CRC 0x{crc:04X}"
+    )
 }
 
 /// An object with its name.
@@ -169,6 +273,7 @@ mod tests {
         Sdo {
             side: Side::Request,
             data: &data,
+            is_segment: false,
         }
         .to_string()
     }
@@ -177,6 +282,7 @@ mod tests {
         Sdo {
             side: Side::Response,
             data: &data,
+            is_segment: false,
         }
         .to_string()
     }
@@ -209,5 +315,42 @@ mod tests {
             "abort 2010:9: no such subindex (0x06090011)"
         );
         assert_eq!(request([0xFF; 8]), "unknown command 0xFF");
+    }
+
+    #[test]
+    fn says_what_a_block_transfer_does() {
+        assert_eq!(
+            request([0xC6, 0x01, 0x20, 1, 0xD0, 0x07, 0, 0]),
+            "write 2001:1 moment.x in blocks, 2000 bytes"
+        );
+        assert_eq!(
+            response([0xA4, 0x01, 0x20, 1, 127, 0, 0, 0]),
+            "2001:1 moment.x in blocks of 127 segments, please"
+        );
+        assert_eq!(
+            response([0xA2, 5, 127, 0, 0, 0, 0, 0]),
+            "block received up to segment 5, next of 127 segments"
+        );
+        assert_eq!(
+            request([0xA2, 5, 64, 0, 0, 0, 0, 0]),
+            "block received up to segment 5, next of 64 segments"
+        );
+        assert_eq!(
+            request([0xCD, 0xC3, 0x31, 0, 0, 0, 0, 0]),
+            "blocks end, 3 bytes of the last segment unused, CRC 0x31C3"
+        );
+        assert_eq!(
+            request([0xA4, 0x01, 0x20, 1, 127, 0, 0, 0]),
+            "read 2001:1 moment.x in blocks of 127 segments"
+        );
+        let segment = Sdo {
+            side: Side::Response,
+            data: &[0x82, 1, 2, 3, 4, 5, 6, 7],
+            is_segment: true,
+        };
+        assert_eq!(
+            segment.to_string(),
+            "last block segment 2 01 02 03 04 05 06 07"
+        );
     }
 }

@@ -8,7 +8,7 @@ use eel_transport::{Content, ErrorFrame, Received};
 
 use crate::decode::{Decoded, decimals, physical};
 use crate::filter::Filter;
-use crate::sdo::{Sdo, Side};
+use crate::service::Service;
 
 /// How lines look.
 #[derive(Clone, Copy, Debug)]
@@ -49,11 +49,12 @@ impl Look {
     ///
     /// # Errors
     /// Those of `out`.
-    pub fn line(self, out: &mut dyn Write, received: &Received, filter: &Filter) -> Result<()> {
+    pub fn line(self, out: &mut dyn Write, seen: &Seen<'_>, filter: &Filter) -> Result<()> {
+        let received = seen.received;
         self.time(out, received.time_ns)?;
         write!(out, "  ")?;
         match &received.content {
-            Content::Frame(frame) => self.frame(out, &Decoded::of(frame), filter)?,
+            Content::Frame(frame) => self.frame(out, &Decoded::of(frame), seen, filter)?,
             Content::Error(error) => self.error(out, error)?,
         }
         writeln!(out)
@@ -67,7 +68,13 @@ impl Look {
         )
     }
 
-    fn frame(self, out: &mut dyn Write, decoded: &Decoded<'_>, filter: &Filter) -> Result<()> {
+    fn frame(
+        self,
+        out: &mut dyn Write,
+        decoded: &Decoded<'_>,
+        seen: &Seen<'_>,
+        filter: &Filter,
+    ) -> Result<()> {
         if self.raw {
             self.bytes(out, decoded)?;
         }
@@ -85,7 +92,7 @@ impl Look {
                 self.signal(out, signal, raw)?;
             }
         }
-        self.service(out, decoded)?;
+        self.service(out, decoded, seen)?;
         if let (Some(Cob::Emergency(_)), Some(code)) = (decoded.cob, decoded.raw("code"))
             && let Some(known) = u16::try_from(code).ok().and_then(emergency::from_code)
         {
@@ -139,32 +146,17 @@ impl Look {
     }
 
     /// Writes what has no signals.
-    fn service(self, out: &mut dyn Write, decoded: &Decoded<'_>) -> Result<()> {
+    fn service(self, out: &mut dyn Write, decoded: &Decoded<'_>, seen: &Seen<'_>) -> Result<()> {
         let data = decoded.frame.data();
-        match (decoded.message, decoded.cob) {
-            (Some(_), _) => Ok(()),
-            _ if decoded.frame.is_remote() => {
-                let (id, length) = (decoded.frame.raw_id(), decoded.frame.length());
-                write!(out, "  id 0x{id:X} remote frame, asks for {length} bytes")
-            }
-            (None, Some(Cob::SdoRequest(_))) => write!(
-                out,
-                "  {}",
-                Sdo {
-                    side: Side::Request,
-                    data
-                }
-            ),
-            (None, Some(Cob::SdoResponse(_))) => {
-                write!(
-                    out,
-                    "  {}",
-                    Sdo {
-                        side: Side::Response,
-                        data
-                    }
-                )
-            }
+        if decoded.message.is_some() {
+            return Ok(());
+        }
+        if decoded.frame.is_remote() {
+            let (id, length) = (decoded.frame.raw_id(), decoded.frame.length());
+            return write!(out, "  id 0x{id:X} remote frame, asks for {length} bytes");
+        }
+        match Service::of(decoded, seen.is_segment) {
+            Some(service) => write!(out, "  {service}"),
             _ if self.raw => Ok(()),
             _ => {
                 write!(out, "  id 0x{:X}", decoded.frame.raw_id())?;
@@ -172,6 +164,15 @@ impl Look {
             }
         }
     }
+}
+
+/// What was received, and what is known of it from what came before.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// What was received.
+    pub received: &'a Received,
+    /// Whether it is a bare segment of an SDO block transfer.
+    pub is_segment: bool,
 }
 
 /// The classes of an error report in words (`linux/can/error.h`).
@@ -222,7 +223,11 @@ mod tests {
             direction: None,
         };
         let mut out = Vec::new();
-        look.line(&mut out, &received, &Filter::default()).unwrap();
+        let seen = Seen {
+            received: &received,
+            is_segment: false,
+        };
+        look.line(&mut out, &seen, &Filter::default()).unwrap();
         String::from_utf8(out).unwrap()
     }
 

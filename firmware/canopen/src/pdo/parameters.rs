@@ -94,6 +94,11 @@ impl Parameters {
         self.count
     }
 
+    /// Returns all mapping entries, be they active or not.
+    pub const fn entries(&self) -> &[Mapped; MAPPED_OBJECTS] {
+        &self.mapping
+    }
+
     /// Returns a mapping entry, 1–8, be it active or not.
     ///
     /// # Errors
@@ -198,22 +203,76 @@ impl Parameters {
             return Err(Abort::UnsupportedAccess);
         }
         let mapped = Mapped::from_raw(raw);
-        if raw != 0 && mapped.is_dummy() {
-            check_dummy(self.direction, mapped)?;
-        } else if raw != 0 {
-            let entry = described?;
-            let allowed = match self.direction {
-                Direction::Receive => entry.rpdo,
-                Direction::Transmit => entry.tpdo,
-            };
-            let bits = entry.length.checked_mul(8);
-            if !allowed || entry.domain || entry.length == 0 || bits != Some(mapped.bits) {
-                return Err(Abort::NotMappable);
-            }
-        }
+        check_mapped(self.direction, mapped, described)?;
         *slot = mapped;
         Ok(())
     }
+
+    /// Holds an entry against what the dictionary says of its object, as
+    /// [`write_entry`](Self::write_entry) does.
+    ///
+    /// # Errors
+    /// [`Abort::NotMappable`], and the error of `described`.
+    pub fn check_entry(
+        &self,
+        mapped: Mapped,
+        described: Result<Entry, Abort>,
+    ) -> Result<(), Abort> {
+        check_mapped(self.direction, mapped, described)
+    }
+
+    /// Takes stored parameters over; `None` for those that can't be written either. The objects are
+    /// not looked at.
+    pub fn restore(
+        &mut self,
+        cob_id: u16,
+        enabled: bool,
+        transmission: u8,
+        count: u8,
+        mapping: [Mapped; MAPPED_OBJECTS],
+    ) -> Option<()> {
+        // Disabled, the mapping may be changed and the identifier too.
+        self.enabled = false;
+        self.write_transmission(transmission).ok()?;
+        self.mapping = mapping;
+        self.write_count(count).ok()?;
+        let is_same = cob_id == self.cob_id;
+        let parsed = if is_same && !enabled {
+            cob_id
+        } else {
+            cob_id::parse(u32::from(cob_id)).ok()?
+        };
+        if enabled && self.count == 0 {
+            return None;
+        }
+        self.cob_id = parsed;
+        self.enabled = enabled;
+        Some(())
+    }
+}
+
+/// Holds a mapping entry against what the dictionary says of its object; 0 is an empty entry.
+fn check_mapped(
+    direction: Direction,
+    mapped: Mapped,
+    described: Result<Entry, Abort>,
+) -> Result<(), Abort> {
+    if mapped == Mapped::default() {
+        return Ok(());
+    }
+    if mapped.is_dummy() {
+        return check_dummy(direction, mapped);
+    }
+    let entry = described?;
+    let allowed = match direction {
+        Direction::Receive => entry.rpdo,
+        Direction::Transmit => entry.tpdo,
+    };
+    let bits = entry.length.checked_mul(8);
+    if !allowed || entry.domain || entry.length == 0 || bits != Some(mapped.bits) {
+        return Err(Abort::NotMappable);
+    }
+    Ok(())
 }
 
 /// Dummies have the index of their data type and stand for bytes that an RPDO skips.

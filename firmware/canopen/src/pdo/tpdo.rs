@@ -143,4 +143,12 @@ impl Tpdo {
         self.sync_start = sync_start;
         Ok(())
     }
+
+    /// Takes stored parameters over; `None` for those that can't be written either.
+    pub fn restore(&mut self, inhibit_100us: u16, event_ms: u16, sync_start: u8) -> Option<()> {
+        self.inhibit_100us = inhibit_100us;
+        self.event_ms = event_ms;
+        self.sync_start = sync_start;
+        (sync_start <= 240).then_some(())
+    }
 }

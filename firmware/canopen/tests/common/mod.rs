@@ -107,6 +107,7 @@ pub struct Store {
     pub status: u32,
     pub text: Vec<u8>,
     pub refuse: bool,
+    pub refuse_configuration: bool,
 }
 
 impl Store {
@@ -120,6 +121,7 @@ impl Store {
             status: 0x3344_5566,
             text: Vec::new(),
             refuse: false,
+            refuse_configuration: false,
         }
     }
 }
@@ -191,6 +193,14 @@ impl Application for Store {
         Ok(())
     }
 
+    fn may_configure(&self) -> Result<(), Abort> {
+        if self.refuse_configuration {
+            Err(Abort::DeviceState)
+        } else {
+            Ok(())
+        }
+    }
+
     fn rpdo_applied(&mut self, number: u8, cob_id: u16) {
         self.calls.push(Call::Applied(number, cob_id));
     }
@@ -217,9 +227,14 @@ pub type Sent = (u16, Vec<u8>);
 impl Bench {
     /// A node as it is after power-on, its boot-up message not yet polled.
     pub fn with(config: Config) -> Self {
+        Self::stored(config, &[])
+    }
+
+    /// A node as it is after power-on, with stored parameters.
+    pub fn stored(config: Config, stored: &[u8]) -> Self {
         let app = Store::new();
         Self {
-            node: Node::new(config, &[], &app, 0),
+            node: Node::new(config, stored, &app, 0),
             app,
             now_us: 0,
         }

@@ -1,4 +1,4 @@
-//! The object dictionary of a vertebra beyond the communication area: 0x2000–0x2040.
+//! The object dictionary of a vertebra beyond the communication area: 0x2000–0x2101.
 //!
 //! Every object is a record whose entries are numbered 1, 2, 3 … without a gap; entry 0 is the
 //! highest of these numbers. [`OBJECTS`] is the one place where a name, a type, a unit or a bound
@@ -13,6 +13,9 @@ use eel_canopen::{Abort, Access, Entry};
 
 pub use table::{Field, OBJECTS};
 
+/// The record whose entries are settings.
+const GAINS: u16 = 0x2020;
+
 /// How an entry lies on the wire; integers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DataType {
@@ -26,6 +29,8 @@ pub enum DataType {
     I16,
     /// INTEGER32.
     I32,
+    /// DOMAIN: bytes that stream, as many as there are.
+    Domain,
 }
 
 /// Which kind of PDO may carry an entry.
@@ -80,7 +85,7 @@ pub struct Sub {
 /// One record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Object {
-    /// Its index, 0x2000–0x2040.
+    /// Its index, 0x2000–0x2101.
     pub index: u16,
     /// Its name, such as `pose`.
     pub name: &'static str,
@@ -91,9 +96,10 @@ pub struct Object {
 }
 
 impl DataType {
-    /// Returns the length in bytes.
+    /// Returns the length of a number in bytes; 0 for a domain.
     pub const fn length(self) -> u8 {
         match self {
+            Self::Domain => 0,
             Self::U8 => 1,
             Self::U16 | Self::I16 => 2,
             Self::U32 | Self::I32 => 4,
@@ -118,6 +124,7 @@ impl DataType {
             Self::U8 => 0x0005,
             Self::U16 => 0x0006,
             Self::U32 => 0x0007,
+            Self::Domain => 0x000F,
         }
     }
 
@@ -129,12 +136,19 @@ impl DataType {
             Self::U32 => "u32",
             Self::I16 => "i16",
             Self::I32 => "i32",
+            Self::Domain => "domain",
         }
     }
 
-    /// Returns the least and the greatest number of the type.
+    /// Tells whether it is a domain, which holds no number.
+    pub const fn is_domain(self) -> bool {
+        matches!(self, Self::Domain)
+    }
+
+    /// Returns the least and the greatest number of the type; twice 0 for a domain.
     pub const fn range(self) -> (i64, i64) {
         match self {
+            Self::Domain => (0, 0),
             Self::U8 => (0, u8::MAX as i64),
             Self::U16 => (0, u16::MAX as i64),
             Self::U32 => (0, u32::MAX as i64),
@@ -146,9 +160,11 @@ impl DataType {
     /// Reads a number from its bytes.
     ///
     /// # Errors
-    /// [`Abort::TooShort`] or [`Abort::TooLong`] for another length.
+    /// [`Abort::TooShort`] or [`Abort::TooLong`] for another length;
+    /// [`Abort::UnsupportedAccess`] for a domain.
     pub fn decode(self, bytes: &[u8]) -> Result<i64, Abort> {
         match (self, bytes) {
+            (Self::Domain, _) => Err(Abort::UnsupportedAccess),
             (Self::U8, &[a]) => Ok(i64::from(a)),
             (Self::U16, &[a, b]) => Ok(i64::from(u16::from_le_bytes([a, b]))),
             (Self::I16, &[a, b]) => Ok(i64::from(i16::from_le_bytes([a, b]))),
@@ -162,8 +178,11 @@ impl DataType {
     /// Writes `value`, saturated to the type, to the start of `out` and returns the length.
     ///
     /// # Errors
-    /// [`Abort::OutOfMemory`] when `out` is too short.
+    /// [`Abort::OutOfMemory`] when `out` is too short; [`Abort::UnsupportedAccess`] for a domain.
     pub fn encode(self, value: i64, out: &mut [u8]) -> Result<usize, Abort> {
+        if self.is_domain() {
+            return Err(Abort::UnsupportedAccess);
+        }
         let (low, high) = self.range();
         let bytes = value.clamp(low, high).to_le_bytes();
         let length = usize::from(self.length());
@@ -180,7 +199,7 @@ impl Sub {
     pub const fn entry(&self) -> Entry {
         Entry {
             length: self.data_type.length(),
-            domain: false,
+            domain: self.data_type.is_domain(),
             access: self.access,
             tpdo: matches!(self.pdo, Pdo::Transmit),
             rpdo: matches!(self.pdo, Pdo::Receive),
@@ -279,6 +298,14 @@ pub fn entry(index: u16, subindex: u8) -> Result<Entry, Abort> {
 pub fn entries() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clone {
     OBJECTS
         .iter()
+        .flat_map(|object| object.subs.iter().map(move |sub| (object, sub)))
+}
+
+/// Returns the entries that are settings: written while nothing moves, and stored.
+pub fn settings() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clone {
+    let object = object(GAINS);
+    object
+        .into_iter()
         .flat_map(|object| object.subs.iter().map(move |sub| (object, sub)))
 }
 

@@ -154,6 +154,23 @@ const SYNC_PHASE: Shape = Shape {
     max: 32_767,
     ..MICROSECONDS
 };
+const DOMAIN: Shape = raw(DataType::Domain, RO, NO);
+const CHANNEL: Shape = raw(DataType::U32, RW, NO);
+const DIVIDER: Shape = Shape {
+    default: 1,
+    min: 1,
+    ..word(RW, NO)
+};
+const TRIGGER: Shape = Shape {
+    max: 2,
+    ..byte(RW, NO)
+};
+const LINK_DATA: Shape = raw(DataType::Domain, RW, NO);
+const LINK_LENGTH: Shape = Shape {
+    default: 889,
+    max: 0x00FF_FFFF,
+    ..raw(DataType::U32, RW, NO)
+};
 
 /// Makes an entry from its shape.
 const fn sub(
@@ -309,6 +326,31 @@ records! {
         3 SyncPhase "sync_phase" SYNC_PHASE,
             "Arrival of the last SYNC against the control tick's own grid.";
     }
+    SCOPE = 0x2050 "scope", "Captures up to four entries of this dictionary, tick by tick, for 2100:2." {
+        1 ScopeChannel1 "channel1" CHANNEL,
+            "Entry that channel 1 captures, as a PDO maps it: index, subindex, bits; 0 is none.";
+        2 ScopeChannel2 "channel2" CHANNEL, "Entry that channel 2 captures, or 0.";
+        3 ScopeChannel3 "channel3" CHANNEL, "Entry that channel 3 captures, or 0.";
+        4 ScopeChannel4 "channel4" CHANNEL, "Entry that channel 4 captures, or 0.";
+        5 ScopeDivider "divider" DIVIDER, "Control ticks of 1 ms from one sample to the next.";
+        6 ScopeTrigger "trigger" TRIGGER,
+            "Writing 0 stops, 1 captures until memory is full, 2 captures around the next fault.";
+        7 ScopeState "state" byte(RO, NO),
+            "What it does: 0 nothing, 1 fills, 2 waits for a fault, 3 captures its end, 4 full.";
+        8 ScopeSamples "samples" word(RO, NO), "Samples that 2100:2 holds.";
+    }
+    RECORD = 0x2100 "record", "What was recorded; read as a domain, in the layouts of docs/vertebra.md." {
+        1 RecordFreeze "freeze" DOMAIN,
+            "Freeze frame: everything at the moment of the last fault or stop.";
+        2 RecordScope "scope" DOMAIN, "What the scope captured; reading it ends the capture.";
+    }
+    LINK = 0x2101 "link", "Test of transfers: what is written is not kept, what is read is a pattern." {
+        1 LinkData "data" LINK_DATA,
+            "Reads as link.length bytes, byte k being (7k + k/256) mod 256; takes any bytes.";
+        2 LinkLength "length" LINK_LENGTH, "Bytes that link.data reads as.";
+        3 LinkCrc "crc" raw(DataType::U32, RO, NO),
+            "CRC-32/ISO-HDLC, Python's zlib.crc32, of what was last written to link.data.";
+    }
 }
 
 impl Field {
@@ -341,6 +383,9 @@ pub(super) const fn position(index: u16) -> Option<usize> {
         0x2021 => 7,
         0x2030 => 8,
         0x2040 => 9,
+        0x2050 => 10,
+        0x2100 => 11,
+        0x2101 => 12,
         _ => return None,
     })
 }

@@ -6,7 +6,10 @@ use core::fmt;
 
 use crate::identity;
 use crate::ids::{Cob, SYNC_COUNTER_OVERFLOW};
-use crate::ids::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, VERTEBRA_HEARTBEAT_MS};
+use crate::ids::{ERROR_BEHAVIOUR, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, VERTEBRA_HEARTBEAT_MS};
+
+/// Bit of object 0x1012: the node consumes TIME.
+const CONSUMES_TIME: u32 = 1 << 31;
 
 /// The default of an entry, as the EDS prints it.
 #[derive(Clone, Copy)]
@@ -32,6 +35,8 @@ pub enum Type {
     U32 = 7,
     /// VISIBLE_STRING.
     Text = 9,
+    /// DOMAIN.
+    Domain = 15,
 }
 
 /// How an object is built of entries.
@@ -43,6 +48,8 @@ pub enum Shape {
     Array,
     /// Entries of several types.
     Record,
+    /// One entry, subindex 0, which is a domain.
+    Domain,
 }
 
 /// One entry.
@@ -83,6 +90,7 @@ impl Shape {
             Self::Variable => 7,
             Self::Array => 8,
             Self::Record => 9,
+            Self::Domain => 2,
         }
     }
 }
@@ -188,6 +196,35 @@ pub const AREA: &[Area] = &[
         "const",
         Default::Text(identity::SOFTWARE_VERSION)
     ),
+    Area {
+        index: 0x1010,
+        name: "Store parameters",
+        shape: Shape::Array,
+        items: &[
+            highest(3, "const"),
+            item(1, "All", Type::U32, "rw", Default::Hex(1)),
+            item(2, "Communication", Type::U32, "rw", Default::Hex(1)),
+            item(3, "Application", Type::U32, "rw", Default::Hex(1)),
+        ],
+    },
+    Area {
+        index: 0x1011,
+        name: "Restore default parameters",
+        shape: Shape::Array,
+        items: &[
+            highest(3, "const"),
+            item(1, "All", Type::U32, "rw", Default::Hex(1)),
+            item(2, "Communication", Type::U32, "rw", Default::Hex(1)),
+            item(3, "Application", Type::U32, "rw", Default::Hex(1)),
+        ],
+    },
+    variable!(
+        0x1012,
+        "COB-ID TIME",
+        U32,
+        "rw",
+        Default::Hex(CONSUMES_TIME | Cob::Time.id() as u32)
+    ),
     variable!(
         0x1014,
         "COB-ID EMCY",
@@ -255,6 +292,28 @@ pub const AREA: &[Area] = &[
         "rw",
         Default::Hex(SYNC_COUNTER_OVERFLOW as u32)
     ),
+    Area {
+        index: 0x1021,
+        name: "Store EDS",
+        shape: Shape::Domain,
+        items: &[item(0, "Store EDS", Type::Domain, "ro", Default::Unknown)],
+    },
+    variable!(0x1022, "Store format", U8, "ro", Default::Hex(0)),
+    Area {
+        index: 0x1029,
+        name: "Error behaviour",
+        shape: Shape::Array,
+        items: &[
+            highest(1, "const"),
+            item(
+                1,
+                "Communication error",
+                Type::U8,
+                "rw",
+                Default::Hex(ERROR_BEHAVIOUR as u32),
+            ),
+        ],
+    },
     Area {
         index: 0x1200,
         name: "SDO server parameter",

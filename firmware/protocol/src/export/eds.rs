@@ -78,7 +78,7 @@ fn write_head(out: &mut dyn Write) -> Result {
          OrderCode=none\nBaudRate_10=0\nBaudRate_20=0\nBaudRate_50=0\nBaudRate_125=0\n\
          BaudRate_250=0\nBaudRate_500=0\nBaudRate_800=0\nBaudRate_1000=1\n\
          SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0\n\
-         GroupMessaging=0\nNrOfRXPDO={rpdos}\nNrOfTXPDO={tpdos}\nLSS_Supported=0\n\n\
+         CompactPDO=0\nGroupMessaging=0\nNrOfRXPDO={rpdos}\nNrOfTXPDO={tpdos}\nLSS_Supported=1\n\n\
          [DummyUsage]\nDummy0001=0\nDummy0002=1\nDummy0003=1\nDummy0004=1\nDummy0005=1\n\
          Dummy0006=1\nDummy0007=1\n",
         name = identity::DEVICE_NAME,
@@ -133,22 +133,34 @@ fn write_opening(out: &mut dyn Write, index: u16, name: &str, shape: Shape, subs
     )
 }
 
-/// Writes what an entry's section holds.
+/// Writes what an entry's section holds. A domain has no default: its bytes would stand there.
 fn write_item(out: &mut dyn Write, item: &Item) -> Result {
+    let Item {
+        name,
+        data_type,
+        access,
+        default,
+        mappable,
+        ..
+    } = *item;
+    let shape = match data_type {
+        Type::Domain => Shape::Domain,
+        _ => Shape::Variable,
+    };
+    let (object, code) = (shape.code(), data_type as u16);
     write!(
         out,
-        "ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}\nAccessType={}\nDefaultValue={}\nPDOMapping={}\n",
-        item.name,
-        item.data_type as u16,
-        item.access,
-        item.default,
-        u8::from(item.mappable)
-    )
+        "ParameterName={name}\nObjectType=0x{object}\nDataType=0x{code:04X}\nAccessType={access}\n"
+    )?;
+    if !matches!(data_type, Type::Domain) {
+        writeln!(out, "DefaultValue={default}")?;
+    }
+    writeln!(out, "PDOMapping={}", u8::from(mappable))
 }
 
 fn write_area(out: &mut dyn Write, area: &Area) -> Result {
     let index = area.index;
-    if let (Shape::Variable, [item]) = (area.shape, area.items) {
+    if let (Shape::Variable | Shape::Domain, [item]) = (area.shape, area.items) {
         writeln!(out, "\n[{index:04X}]")?;
         return write_item(out, item);
     }
@@ -304,15 +316,24 @@ fn write_sub(out: &mut dyn Write, object: &Object, sub: &Sub) -> Result {
         sub.subindex,
         object.dotted(sub)
     )?;
+    let is_domain = sub.data_type.is_domain();
+    let shape = if is_domain {
+        Shape::Domain
+    } else {
+        Shape::Variable
+    };
     writeln!(
         out,
-        "ObjectType=0x7\nDataType=0x{:04X}\nAccessType={access}",
+        "ObjectType=0x{}\nDataType=0x{:04X}\nAccessType={access}",
+        shape.code(),
         sub.data_type.code()
     )?;
     if (sub.min, sub.max) != sub.data_type.range() {
         writeln!(out, "LowLimit={}\nHighLimit={}", sub.min, sub.max)?;
     }
-    writeln!(out, "DefaultValue={}", sub.default)?;
+    if !is_domain {
+        writeln!(out, "DefaultValue={}", sub.default)?;
+    }
     writeln!(out, "PDOMapping={}", u8::from(sub.pdo != Pdo::No))?;
     if sub.scale.numerator != sub.scale.denominator {
         writeln!(out, "Factor={}", Decimal(sub.scale))?;

@@ -160,12 +160,16 @@ fn write_row(out: &mut dyn Write, sub: &Sub) -> Result {
         Pdo::Receive => "RPDO",
         Pdo::Transmit => "TPDO",
     };
-    write!(
-        out,
-        "| {} | {access} | {pdo} | {} ",
-        sub.data_type.name(),
-        Decimal(sub.scale)
-    )?;
+    let data_type = sub.data_type.name();
+    if sub.data_type.is_domain() {
+        return writeln!(
+            out,
+            "| {data_type} | {access} | | | | | | {} |",
+            sub.description
+        );
+    }
+    let step = Decimal(sub.scale);
+    write!(out, "| {data_type} | {access} | {pdo} | {step} ")?;
     write!(out, "| {} | {} ", sub.unit, sub.default)?;
     writeln!(out, "| {} to {} | {} |", sub.min, sub.max, sub.description)
 }

@@ -1,6 +1,7 @@
 //! `eel export`: the dictionary as files of other tools.
 
-use std::fmt;
+mod grammar;
+
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -17,7 +18,9 @@ pub enum Format {
     Dbc,
     /// Tables in markdown, for people
     Md,
-    /// All three, into the folder given with --out
+    /// The electronic data sheet as vertebrae carry it, compressed
+    Carried,
+    /// EDS, DBC and tables, into the folder given with --out
     All,
 }
 
@@ -29,18 +32,22 @@ impl Format {
         match self {
             Self::Eds => "vertebra.eds",
             Self::Dbc => "vertebra.dbc",
+            Self::Carried => "vertebra.grammar",
             Self::Md | Self::All => "dictionary.md",
         }
     }
 
-    fn text(self) -> Result<String, fmt::Error> {
+    fn bytes(self) -> Result<Vec<u8>> {
         let mut text = String::new();
         match self {
-            Self::Eds => write_eds(&mut text)?,
+            Self::Eds | Self::Carried => write_eds(&mut text)?,
             Self::Dbc => write_dbc(&mut text)?,
             Self::Md | Self::All => write_markdown(&mut text)?,
         }
-        Ok(text)
+        match self {
+            Self::Carried => grammar::compress(text.as_bytes()),
+            _ => Ok(text.into_bytes()),
+        }
     }
 }
 
@@ -59,10 +66,10 @@ pub fn export(format: Format, out: Option<&Path>) -> Result<()> {
                 .try_for_each(|format| write(format, &folder.join(format.file_name())))
         }
         (_, Some(path)) => write(format, path),
-        (_, None) => Ok(std::io::stdout().write_all(format.text()?.as_bytes())?),
+        (_, None) => Ok(std::io::stdout().write_all(&format.bytes()?)?),
     }
 }
 
 fn write(format: Format, path: &Path) -> Result<()> {
-    fs::write(path, format.text()?).with_context(|| format!("can't write {}", path.display()))
+    fs::write(path, format.bytes()?).with_context(|| format!("can't write {}", path.display()))
 }

@@ -1,0 +1,64 @@
+//! What the bus asks to be stored, on its way to the platform's flash and back.
+
+use eel_canopen::{Abort, StoreRequest};
+use eel_protocol::NodeId;
+use eel_units::Instant;
+
+use crate::store::{Record, StoreError};
+use crate::vertebra::Vertebra;
+
+impl Vertebra {
+    /// Returns what the platform shall store now, once for each request; it then calls
+    /// [`finish_store`](Self::finish_store), before or after other turns. The bus waits for a second.
+    pub fn poll_store(&mut self) -> Option<Record> {
+        let request = self.storing.asked.take()?;
+        let mut record = self.storing.stored.clone();
+        match request {
+            StoreRequest::Save(group) => {
+                if group.has_communication() {
+                    let room = record.communication.capacity();
+                    // A record holds as much as a node saves.
+                    let _ = record.communication.resize(room, 0);
+                    let length = self.node.save_parameters(&mut record.communication);
+                    record.communication.truncate(length.unwrap_or_default());
+                }
+                if group.has_application() {
+                    record.keep_settings(&self.core.settings);
+                }
+            }
+            StoreRequest::Restore(group) => {
+                if group.has_communication() {
+                    record.communication.clear();
+                }
+                if group.has_application() {
+                    record.forget_settings();
+                }
+            }
+            StoreRequest::NodeId(id) => record.node = NodeId::new(id),
+        }
+        // What was lost stays lost until settings are stored or restored.
+        let is_mended = match request {
+            StoreRequest::Save(group) | StoreRequest::Restore(group) => group.has_application(),
+            StoreRequest::NodeId(_) => false,
+        };
+        record.lost = self.core.settings_lost && !is_mended;
+        self.storing.coming = Some(record.clone());
+        Some(record)
+    }
+
+    /// Hears what became of what [`poll_store`](Self::poll_store) returned, and answers the bus. What is
+    /// stored counts from the next reset of the node on.
+    pub fn finish_store(&mut self, now: Instant, outcome: Result<(), StoreError>) {
+        let coming = self.storing.coming.take();
+        if outcome.is_ok()
+            && let Some(record) = coming
+        {
+            self.core.settings_lost = record.lost;
+            self.storing.stored = record;
+        }
+        let outcome = outcome.map_err(|error| match error {
+            StoreError::Flash | StoreError::Verify => Abort::Hardware,
+        });
+        self.node.finish_store(now.to_micros(), outcome);
+    }
+}
