@@ -29,7 +29,7 @@ mod sdo;
 
 pub use abort::{ABORTS, AbortCode, abort};
 pub use client::{Client, Heard, Settings};
-pub use eel_canopen::{NmtCommand, NmtState};
+pub use eel_canopen::{Access, NmtCommand, NmtState};
 pub use error::{ClientError, LssFailure, Multiplexor, Violation};
 pub use history::PastError;
 pub use lss::{Lss, LssAddress};
