@@ -36,16 +36,20 @@ pub struct Identification {
 }
 
 impl<B: Bus> Client<B> {
-    /// Finds all nodes: asks all 127 ids for their device type at once and listens for `time`,
-    /// which should be longer than the nodes' heartbeat periods, so that stopped nodes are heard
-    /// too.
+    /// Finds nodes: asks `ids` for their device type at once and listens for `time`, which should be
+    /// longer than the nodes' heartbeat periods, so that stopped nodes are heard too. Who sends a
+    /// heartbeat is found whatever its id.
     ///
     /// # Errors
     /// What the bus fails with.
-    pub fn find_nodes(&mut self, time: Duration) -> Result<Vec<Found>, ClientError> {
+    pub fn find_nodes(
+        &mut self,
+        ids: impl IntoIterator<Item = u8>,
+        time: Duration,
+    ) -> Result<Vec<Found>, ClientError> {
         self.drain()?;
         let [low, high, subindex] = DEVICE_TYPE.bytes();
-        for node in 1..=127 {
+        for node in ids {
             let request = [0x40, low, high, subindex, 0, 0, 0, 0];
             self.send(Cob::SdoRequest(node).id(), &request)?;
         }
@@ -126,7 +130,9 @@ mod tests {
             script.add((0x600 + node, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]), answers);
         }
         let mut client = client(script);
-        let found = client.find_nodes(Duration::from_millis(5)).unwrap();
+        let found = client
+            .find_nodes(1..=127, Duration::from_millis(5))
+            .unwrap();
         let expected = [
             (3, None, Some(0x0002_0192)),
             (9, Some(NmtState::Stopped), None),

@@ -315,6 +315,9 @@ fn words(event: &Event) -> String {
             state.name()
         ),
         Event::Emergency(node, report) => match emergency::from_code(report.code) {
+            Some(known) if known.severity == Severity::Cleared => {
+                format!("{}  {}: {}", vertebra(node), known.name, known.sentence)
+            }
             Some(known) => format!(
                 "{}  {} {}: {}",
                 vertebra(node),

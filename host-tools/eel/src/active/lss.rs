@@ -262,7 +262,7 @@ impl Assign {
         if (self.serial.is_some() || self.from.is_some()) && self.ids.len() != 1 {
             return Err(Usage(format!("{option} takes one id")).into());
         }
-        let found = client.find_nodes(TAKEN)?;
+        let found = client.find_nodes(self.ids.iter().copied(), TAKEN)?;
         if let Some(taken) = found.iter().find(|found| self.ids.contains(&found.node)) {
             return Err(Usage(format!(
                 "id {} is taken: `eel nodes` shows by whom",

@@ -151,7 +151,7 @@ impl Row {
         };
         let serial = self
             .address
-            .map(|address| format!("{:08X}", address.serial));
+            .map(|address| format!("0x{:08X}", address.serial));
         let versions = [&self.device, &self.hardware, &self.software];
         let versions: Vec<_> = versions
             .into_iter()
@@ -221,7 +221,7 @@ impl Nodes {
             None => self.bus.name()?,
         };
         let mut client = Client::new(bus::open(&bus)?);
-        let found = client.find_nodes(Duration::from_secs_f64(self.listen))?;
+        let found = client.find_nodes(1..=127, Duration::from_secs_f64(self.listen))?;
         let mut rows = Vec::new();
         for found in found {
             rows.push(Row::read(&mut client, found)?);

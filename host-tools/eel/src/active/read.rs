@@ -9,10 +9,12 @@ use eel_client::{Client, ClientError, Method, Progress};
 use serde_json::json;
 
 use super::bus::{AnyBus, BusOption};
-use super::object::{self, Object};
+use super::object::{self, Kind, Object};
 use super::value::Value;
 use super::{Node, Usage};
 
+/// The abort code of an object that exists and holds nothing now.
+const NO_DATA: u32 = 0x0800_0024;
 /// Bytes from which on a transfer shows how far it is.
 const LONG: usize = 2_000;
 
@@ -108,18 +110,26 @@ impl Read {
                 writeln!(stdout(), "{name:width$}  {}", value.text(object))?;
                 Ok((None, false))
             }
-            Err(ClientError::Aborted { code, .. }) if self.json => {
-                let place = object.place;
-                let row = json!({
-                    "name": name, "index": place.index, "subindex": place.subindex,
-                    "error": eel_client::abort(code).meaning, "code": code,
-                });
-                Ok((Some(row), true))
-            }
             // One that is refused is no reason not to read the others; silence is.
-            Err(error @ ClientError::Aborted { .. }) => {
-                eprintln!("eel: {name}: {error}");
-                Ok((None, true))
+            Err(error @ ClientError::Aborted { code, .. }) => {
+                // That there is nothing is an answer too.
+                let is_empty = code == NO_DATA;
+                let place = object.place;
+                if self.json {
+                    let row = json!({
+                        "name": name, "index": place.index, "subindex": place.subindex,
+                        "error": eel_client::abort(code).meaning, "code": code,
+                    });
+                    return Ok((Some(row), !is_empty));
+                }
+                if is_empty {
+                    writeln!(stdout(), "{name:width$}  nothing")?;
+                } else if object.kind == Kind::Unknown {
+                    eprintln!("eel: {error}");
+                } else {
+                    eprintln!("eel: {name}: {error}");
+                }
+                Ok((None, !is_empty))
             }
             Err(error) => Err(error.into()),
         }

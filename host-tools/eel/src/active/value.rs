@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use eel_protocol::{Mode, State, Status, emergency};
+use eel_protocol::{LimitCode, Mode, State, Status, dictionary, emergency};
 use serde_json::json;
 
 use super::Usage;
@@ -135,27 +135,47 @@ fn number(object: &Object, raw: i64) -> String {
 
 /// Returns what a code means.
 fn words(object: &Object, raw: i64) -> Option<String> {
-    let word = u16::try_from(raw & 0xFFFF).ok()?;
+    let long = u32::try_from(raw).ok()?;
+    let word = long as u16;
     let (low, high) = ((word & 0xF) as u8, word >> 4 & 0xF);
     match (object.place.index, object.place.subindex) {
         (0x1003, 1..) => {
             let name = emergency::from_code(word).map(|known| known.name);
             Some(name.unwrap_or("another maker's").to_owned())
         }
+        (0x1016, 1..) if long != 0 => Some(format!("node {}, {word} ms", long >> 16 & 0x7F)),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => {
+            Some(if long >> 31 == 0 { "on" } else { "off" }.to_owned())
+        }
+        (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => Some(mapped(long)),
         (0x2000, 4) => Some(format!("{}, counter {high}", Mode::from_code(low)?.name())),
         (0x2010, 4) => Some(format!("{}, counter {high}", State::from_code(low)?.name())),
         (0x2010, 6) => {
-            let names: Vec<_> = Status::from_bits(word)
-                .conditions()
-                .map(eel_protocol::Condition::name)
-                .collect();
+            let conditions = Status::from_bits(word).conditions();
+            let names: Vec<_> = conditions.map(eel_protocol::Condition::name).collect();
             Some(if names.is_empty() {
                 "nothing in the way".to_owned()
             } else {
                 names.join(", ")
             })
         }
+        (0x2011, 4) => {
+            let codes = [low, high as u8, (word >> 8 & 0xF) as u8];
+            let names = codes.map(|code| LimitCode::from_code(code).map_or("?", LimitCode::name));
+            Some(names.join(", "))
+        }
         _ => None,
+    }
+}
+
+/// Returns what a mapping entry means.
+fn mapped(raw: u32) -> String {
+    let (index, subindex, bits) = ((raw >> 16) as u16, (raw >> 8) as u8, raw as u8);
+    match (index, dictionary::find(index, subindex)) {
+        (0, _) => "nothing".to_owned(),
+        (1..=7, _) => format!("{bits} bits that are skipped"),
+        (_, Ok((object, sub))) => format!("{}, {bits} bits", object.dotted(sub)),
+        (_, Err(_)) => format!("{index:04X}:{subindex}, {bits} bits"),
     }
 }
 
@@ -282,6 +302,19 @@ mod tests {
         assert_eq!(
             shown("error.newest", &[0x30, 0x81, 0x7F, 0]),
             "0x007F8130  head-lost"
+        );
+        assert_eq!(
+            shown("heartbeat.consumer", &[0x2C, 1, 0x7F, 0]),
+            "0x007F012C  node 127, 300 ms"
+        );
+        assert_eq!(
+            shown("tpdo1.mapping.1", &[0x10, 1, 0x10, 0x20]),
+            "0x20100110  pose.yaw, 16 bits"
+        );
+        assert_eq!(shown("rpdo2.cob_id", &[3, 3, 0, 0x80]), "0x80000303  off");
+        assert_eq!(
+            shown("effort.limits", &[0x10, 0x0F]),
+            "3856  none, peak, off"
         );
         assert_eq!(shown("moment.stiffness", &[0, 0x80]), "1.000000");
         assert_eq!(shown("0x5000", &[1, 0xAB]), "2 bytes 01 AB");
