@@ -250,6 +250,9 @@ mod tests {
                 );
             }
         }
+        for Row(index, subindex, name, _) in NAMES {
+            assert!(find(*index, *subindex).is_some(), "nobody has {name}");
+        }
         let names: BTreeSet<String> = entries().map(|(name, _)| name.to_string()).collect();
         assert_eq!(names.len(), entries().count());
         for (object, sub) in dictionary::entries() {

@@ -204,7 +204,7 @@ impl fmt::Display for LssFailure {
                 detail,
             } => {
                 let what = match (service, code) {
-                    (0x11, 1) => "the node id is outside of what it takes",
+                    (0x11, 1) => "the node id is outside of what it takes (a vertebra: 1 to 10)",
                     (0x13, 1) => "it does not know this bit rate",
                     (0x17, 1) => "it can't store",
                     (0x17, 2) => "its memory failed",

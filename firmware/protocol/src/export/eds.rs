@@ -3,7 +3,7 @@
 use core::fmt::{Result, Write};
 
 use super::Decimal;
-use super::communication::{AREA, Area, Default, Item, MAPPED, PARAMETERS, Shape, highest};
+use super::communication::{AREA, Area, Default, Item, MAPPED, PARAMETERS, Shape, Type, highest};
 use crate::dictionary::{OBJECTS, Object, Pdo, Sub};
 use crate::identity;
 use crate::pdo::{Mapped, PdoDefault, RPDOS, TPDOS};

@@ -220,23 +220,32 @@ impl Live {
         }
     }
 
+    /// Acknowledges a stop that was latched before the head came, where that is wanted, once for
+    /// each vertebra; tells whether it did.
+    fn acknowledge(&mut self, event: &Event, elapsed: Duration) -> bool {
+        let Event::Latched(node, _) = event else {
+            return false;
+        };
+        let bit = 1 << node.index();
+        let is_due = self.resets_first && elapsed < BEFORE && self.has_reset & bit == 0;
+        if is_due {
+            self.has_reset |= bit;
+            self.head.reset();
+        }
+        is_due
+    }
+
     fn events(&mut self, elapsed: Duration) -> Result<()> {
         while let Some(event) = self.head.poll_event() {
-            self.outcome.troubles += u64::from(is_trouble(&event));
-            if let Event::Latched(node, _) = event {
-                let bit = 1 << node.index();
-                if self.resets_first && elapsed < BEFORE && self.has_reset & bit == 0 {
-                    self.has_reset |= bit;
-                    self.outcome.troubles -= 1;
-                    self.head.reset();
-                }
-            }
+            let acknowledged = self.acknowledge(&event, elapsed);
+            self.outcome.troubles += u64::from(is_trouble(&event) && !acknowledged);
             self.status.clear();
             let mut out = stdout().lock();
             if self.is_json {
                 writeln!(out, "{}", json_of(&event, elapsed))?;
             } else {
-                writeln!(out, "{:9.3}  {}", elapsed.as_secs_f64(), words(&event))?;
+                let told = words(&event, acknowledged);
+                writeln!(out, "{:9.3}  {told}", elapsed.as_secs_f64())?;
             }
             out.flush()?;
         }
@@ -300,7 +309,7 @@ fn is_trouble(event: &Event) -> bool {
 }
 
 /// Returns an event in words.
-fn words(event: &Event) -> String {
+fn words(event: &Event, acknowledged: bool) -> String {
     let vertebra = |node: &NodeId| format!("vertebra {:<2}", node.get());
     match event {
         Event::Booted(node) => format!("{}  on the bus", vertebra(node)),
@@ -309,6 +318,13 @@ fn words(event: &Event) -> String {
             "{}  fell silent: check its supply and cable",
             vertebra(node)
         ),
+        Event::Latched(node, state) if acknowledged => {
+            format!(
+                "{}  was latched ({}), acknowledged",
+                vertebra(node),
+                state.name()
+            )
+        }
         Event::Latched(node, state) => format!(
             "{}  latched ({}): find the cause, then start the head with --reset",
             vertebra(node),
