@@ -1,7 +1,7 @@
 //! `eel lss`: node ids for nodes that have none, or another.
 
 use std::collections::BTreeSet;
-use std::io::{Write, stdout};
+use std::io::{IsTerminal, Write, stderr, stdout};
 use std::time::Duration;
 
 use anyhow::Result;
@@ -19,9 +19,10 @@ const BOOT: Duration = Duration::from_secs(2);
 const TAKEN: Duration = Duration::from_millis(600);
 
 const AFTER: &str = "\
-A new vertebra has no node id and is silent. scan lists such nodes by their identity, assign gives them
-ids, one after another in the order found (by rising identity) or by serial number. An id lasts until
-power is off unless it is stored (--store, or later `eel lss store`).
+A new vertebra has no node id and is silent. scan lists such nodes by their identity (about 5 s each,
+as every bit of it is asked for); assign gives them ids, one after another in the order found (by rising
+identity) or by serial number. An id lasts until power is off unless it is stored (--store, or later
+`eel lss store`).
 
 --json: scan, inquire: an array of objects: vendor, product, revision, serial, and node where there is
 one (numbers). assign: the same, with node, stored and booted (bool).
@@ -148,6 +149,9 @@ impl Lss {
     }
 
     fn scan(&self, client: &mut Client<AnyBus>) -> Result<(Vec<serde_json::Value>, u64)> {
+        if stderr().is_terminal() {
+            eprintln!("eel: searching; each node takes about 5 s");
+        }
         let found = client.lss().list()?;
         for address in &found {
             self.say(format_args!("{address}"))?;

@@ -84,7 +84,11 @@ impl Write {
             if self.json {
                 rows.push(value.json(object));
             } else {
-                let (name, text) = (&object.name, value.text(object));
+                let name = &object.name;
+                let text = match &value {
+                    Value::Bytes(bytes) => format!("{} bytes", bytes.len()),
+                    _ => value.text(object),
+                };
                 writeln!(stdout(), "{name:width$}  {text}  written")?;
             }
         }
