@@ -4,6 +4,9 @@
 //! processor, so nothing here asserts a wall-clock time.
 
 #[cfg(target_os = "linux")]
+#[path = "socketcan/bring_up.rs"]
+mod bring_up;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/can_utils.rs"]
 mod can_utils;
 #[cfg(target_os = "linux")]

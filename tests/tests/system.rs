@@ -1,5 +1,7 @@
 //! The whole robot in simulated time: it swims, and it lets go when it must.
 
+#[path = "system/client.rs"]
+mod client;
 #[path = "system/faults.rs"]
 mod faults;
 #[path = "system/swim.rs"]

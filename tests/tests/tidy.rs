@@ -37,8 +37,13 @@ const IMPORTS: &[(&str, &[&str])] = &[
     ),
     ("eel-transport", &["eel-protocol"]),
     (
+        "eel-client",
+        &["eel-canopen", "eel-protocol", "eel-transport"],
+    ),
+    (
         "eel",
         &[
+            "eel-client",
             "eel-transport",
             "eel-head",
             "eel-kinematics",
@@ -290,7 +295,9 @@ fn manifest_of(name: &str) -> String {
     let folder = match name {
         "hil-sim" => "hil-sim".to_owned(),
         "eel" | "xtask" => format!("host-tools/{name}"),
-        "eel-transport" => "host-tools/transport".to_owned(),
+        "eel-client" | "eel-transport" => {
+            format!("host-tools/{}", name.trim_start_matches("eel-"))
+        }
         _ => format!("firmware/{}", name.trim_start_matches("eel-")),
     };
     format!("{folder}/Cargo.toml")

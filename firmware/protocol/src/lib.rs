@@ -9,6 +9,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod communication;
 mod crc;
 pub mod dictionary;
 pub mod eds;

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
+use crate::active::{Head, Lss, Nmt, Nodes, Read, Store, Write};
 use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
 use crate::source::Limits;
@@ -13,10 +14,13 @@ use crate::{json, report};
 
 const AFTER: &str = "\
 Buses: vcan0 or can0 (SocketCAN, Linux), a candump file (candump -L; its name has a dot or a
-slash), or - for a candump recording on standard input. eel only listens; it never sends.
+slash), or - for a candump recording on standard input. Commands that send take an interface: --bus,
+or the variable EEL_BUS, or the only one that is up. What can move a robot needs --yes, except on a
+virtual interface.
 
 Exit codes: 0 fine; 1 found a fault (bad, lost, repeated or late frames, a fault emergency, a line
-that can't be read); 2 wrong usage, or a wrist that can't; 3 the bus or the file failed.
+that can't be read, a node that refuses or is silent); 2 wrong usage, or a wrist that can't; 3 the bus
+or the file failed.
 
 Examples:
   eel sniff vcan0 --node 3 --name pose        what vertebra 3 reports, live
@@ -24,9 +28,13 @@ Examples:
   eel decode swim.log --name target.yaw --json
   eel stats swim.log                          load, rates, jitter, losses
   eel export all --out docs/generated         EDS, DBC and tables for other tools
+  eel nodes                                   who is on the bus, and how they are
+  eel read 3 pose.yaw                         one value of vertebra 3, in rad
+  eel write 3 gains.peak_torque=2.5           in N.m, range-checked
+  eel head vcan0 --gait swim --seconds 20     lead simulated vertebrae through a gait
   eel wrist ik --yaw 20 --degrees             motor angles for a pose; eel wrist --help says more";
 
-/// Anguilla's bus in words and numbers, and its wrist: sniff, decode, measure, ask
+/// Anguilla's bus and its wrist: listen, measure, bring nodes up, lead them, ask
 #[derive(Debug, Parser)]
 #[command(name = "eel", version, after_help = AFTER, disable_help_subcommand = true)]
 pub struct Eel {
@@ -49,6 +57,50 @@ pub enum Command {
     Export(Export),
     /// Ask the wrist: inverse, direct, Jacobian, torques, margins, maps, drawings, the paper's claims
     Wrist(Wrist),
+    Nodes(Nodes),
+    Read(Read),
+    Write(Write),
+    Nmt(Nmt),
+    Lss(Lss),
+    Store(Store),
+    Head(Head),
+}
+
+/// The commands as `eel --help` lists them.
+const GROUPS: [(&str, &[&str]); 3] = [
+    (
+        "Listen to a bus or a recording (nothing is sent)",
+        &["sniff", "decode", "stats"],
+    ),
+    (
+        "Ask and command nodes (these send)",
+        &["nodes", "read", "write", "nmt", "lss", "store", "head"],
+    ),
+    ("Without a bus", &["export", "wrist"]),
+];
+
+/// Returns the command line with its commands in groups.
+fn command() -> clap::Command {
+    let command = Eel::command();
+    let mut template = String::from("{about}\n\n{usage-heading} {usage}\n");
+    for (title, names) in GROUPS {
+        template.push_str(&format!("\n{title}:\n"));
+        for name in names {
+            let about = command
+                .find_subcommand(name)
+                .and_then(clap::Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            template.push_str(&format!("  {name:<8}{about}\n"));
+        }
+    }
+    template.push_str("\nOptions:\n{options}{after-help}");
+    command.help_template(template)
+}
+
+/// Reads the command line; ends the program where it is wrong or asks for help.
+pub fn parse() -> Eel {
+    let matches = command().get_matches();
+    Eel::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
 fn listen_help() -> String {
@@ -229,12 +281,22 @@ impl Physical {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
-    fn the_command_line_is_well_formed() {
-        Eel::command().debug_assert();
+    fn the_command_line_is_well_formed_and_every_command_is_in_a_group() {
+        command().debug_assert();
+        let mut grouped: Vec<_> = GROUPS.iter().flat_map(|(_, names)| names.iter()).collect();
+        let all = command();
+        let mut all: Vec<_> = all.get_subcommands().map(clap::Command::get_name).collect();
+        grouped.sort();
+        all.sort_unstable();
+        assert!(grouped.into_iter().eq(&all));
+        assert!(
+            command()
+                .render_help()
+                .to_string()
+                .contains("  nmt     Command")
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! The `eel` command: what is on the bus, in words and numbers, and what the wrist answers.
 
+mod active;
 mod channels;
 mod cli;
 mod decode;
@@ -20,10 +21,9 @@ use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use clap::Parser;
 use eel_transport::Received;
 
-use cli::{Colour, Command, Eel, Lines, Stats};
+use cli::{Colour, Command, Lines, Stats};
 use listen::{Form, Listener, Recording};
 use source::{Limits, Seen, Sink};
 use stats::Statistics;
@@ -32,7 +32,7 @@ use stats::Statistics;
 const BUFFER: usize = 1 << 16;
 
 fn main() -> ExitCode {
-    let eel = Eel::parse();
+    let eel = cli::parse();
     let result = match eel.command {
         Command::Sniff(sniff) => {
             let record = sniff.record.as_deref();
@@ -54,6 +54,13 @@ fn main() -> ExitCode {
         Command::Stats(stats) => measure(&stats),
         Command::Export(export) => export::export(export.format, export.out.as_deref()).map(|()| 0),
         Command::Wrist(wrist) => wrist::run(&wrist),
+        Command::Nodes(nodes) => nodes.run(),
+        Command::Read(read) => read.run(),
+        Command::Write(write) => write.run(),
+        Command::Nmt(nmt) => nmt.run(),
+        Command::Lss(lss) => lss.run(),
+        Command::Store(store) => store.run(),
+        Command::Head(head) => head.run(),
     };
     match result {
         Ok(0) => ExitCode::SUCCESS,
@@ -62,7 +69,11 @@ fn main() -> ExitCode {
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("eel: {error:#}");
-            ExitCode::from(if error.is::<wrist::Refused>() { 2 } else { 3 })
+            ExitCode::from(if error.is::<wrist::Refused>() {
+                2
+            } else {
+                active::exit_code(&error)
+            })
         }
     }
 }

@@ -40,7 +40,11 @@ impl fmt::Display for Sdo<'_> {
         };
         if command == 0x80 {
             let code = u32::from_le_bytes([a, b, c, d]);
-            return write!(out, "abort {object}: {} (0x{code:08X})", reason(code));
+            return write!(
+                out,
+                "abort {object}: {} (0x{code:08X})",
+                eel_client::abort(code).meaning
+            );
         }
         let value = Value {
             object,
@@ -228,40 +232,6 @@ impl fmt::Display for Value {
             .iter()
             .rev()
             .try_for_each(|byte| write!(out, "{byte:02X}"))
-    }
-}
-
-/// Says what an abort code means (CiA 301, 7.2.4.3.17).
-fn reason(code: u32) -> &'static str {
-    match code {
-        0x0503_0000 => "toggle bit not alternated",
-        0x0504_0000 => "timed out",
-        0x0504_0001 => "unknown command",
-        0x0504_0002 => "invalid block size",
-        0x0504_0003 => "invalid sequence number",
-        0x0504_0004 => "CRC error",
-        0x0504_0005 => "out of memory",
-        0x0601_0000 => "unsupported access",
-        0x0601_0001 => "write only",
-        0x0601_0002 => "read only",
-        0x0602_0000 => "no such object",
-        0x0604_0041 => "can't be mapped",
-        0x0604_0042 => "PDO too long",
-        0x0604_0043 => "parameter incompatible",
-        0x0606_0000 => "hardware failed",
-        0x0607_0010 => "wrong length",
-        0x0607_0012 => "too long",
-        0x0607_0013 => "too short",
-        0x0609_0011 => "no such subindex",
-        0x0609_0030 => "value not allowed",
-        0x0609_0031 => "value too high",
-        0x0609_0032 => "value too low",
-        0x0800_0000 => "general error",
-        0x0800_0020 => "can't transfer or store",
-        0x0800_0021 => "under local control",
-        0x0800_0022 => "not in this state",
-        0x0800_0024 => "no data",
-        _ => "unknown reason",
     }
 }
 

@@ -1,6 +1,6 @@
 //! Frames from any bus, with what to do about lines that can't be read.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -11,8 +11,12 @@ const TOLD: u64 = 10;
 /// Longest wait before the caller may flush and look at the time.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Set by Ctrl-C.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+/// How often Ctrl-C came.
+static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
+/// How often Ctrl-C is left to the program before it ends it, whatever it does.
+const PATIENT: u32 = 3;
+/// Exit code of a program that Ctrl-C ended, as shells count it.
+const INTERRUPT_CODE: i32 = 130;
 
 /// When to stop, and how strict to be.
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,13 +55,22 @@ pub trait Sink {
     fn idle(&mut self) -> std::io::Result<()>;
 }
 
-/// Makes Ctrl-C end the pass in good order.
+/// Makes Ctrl-C end the pass in good order; one that is pressed again and again ends the program.
 ///
 /// # Errors
 /// When the system refuses.
 pub fn catch_interrupt() -> Result<()> {
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed))
-        .context("can't listen for Ctrl-C")
+    ctrlc::set_handler(|| {
+        if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= PATIENT {
+            std::process::exit(INTERRUPT_CODE);
+        }
+    })
+    .context("can't listen for Ctrl-C")
+}
+
+/// Returns how often Ctrl-C came since [`catch_interrupt`].
+pub fn interrupts() -> u32 {
+    INTERRUPTS.load(Ordering::Relaxed)
 }
 
 /// Opens a bus or a file.
@@ -76,10 +89,8 @@ pub fn open(url: &str) -> Result<Box<dyn Bus + Send>> {
 pub fn run(bus: &mut dyn Bus, limits: Limits, sink: &mut dyn Sink) -> Result<Seen> {
     let begin = Instant::now();
     let mut seen = Seen::default();
-    let is_over = |seen: &Seen| {
-        INTERRUPTED.load(Ordering::Relaxed)
-            || limits.count.is_some_and(|count| seen.frames >= count)
-    };
+    let is_over =
+        |seen: &Seen| interrupts() > 0 || limits.count.is_some_and(|count| seen.frames >= count);
     while !is_over(&seen) {
         if limits
             .seconds

@@ -34,6 +34,20 @@ pub trait Bus {
     }
 }
 
+impl<B: Bus + ?Sized> Bus for Box<B> {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        (**self).send(frame)
+    }
+
+    fn receive(&mut self, timeout: Duration) -> Result<Option<Received>, BusError> {
+        (**self).receive(timeout)
+    }
+
+    fn dropped(&self) -> u64 {
+        (**self).dropped()
+    }
+}
+
 /// What came from a bus, and when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received {

@@ -9,6 +9,7 @@ mod bus;
 pub mod candump;
 mod error;
 mod file;
+mod interfaces;
 mod memory;
 #[cfg(target_os = "linux")]
 mod socket;
@@ -17,6 +18,7 @@ pub use bits::{INTERFRAME_BITS, TAIL_BITS, frame_bits, frame_bits_max, frame_bit
 pub use bus::{Bus, Content, ErrorFrame, Received, open};
 pub use error::BusError;
 pub use file::FileBus;
+pub use interfaces::{Interface, interfaces};
 pub use memory::{MemoryBus, pair};
 #[cfg(target_os = "linux")]
 pub use socket::SocketBus;

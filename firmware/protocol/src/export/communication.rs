@@ -112,7 +112,8 @@ const fn item(
     }
 }
 
-const fn highest(number: u32, access: &'static str) -> Item {
+/// Makes the entry 0 of an array or record.
+pub const fn highest(number: u32, access: &'static str) -> Item {
     item(
         0,
         "Highest subindex",
@@ -336,6 +337,26 @@ pub const AREA: &[Area] = &[
             ),
         ],
     },
+];
+
+/// Makes an entry of a PDO record, whose default the PDO tells.
+const fn parameter(subindex: u8, name: &'static str, data_type: Type) -> Item {
+    item(subindex, name, data_type, "rw", Default::Hex(0))
+}
+
+/// The parameters of a TPDO; an RPDO has the first two.
+pub const PARAMETERS: [Item; 5] = [
+    parameter(1, "COB-ID", Type::U32),
+    parameter(2, "Transmission type", Type::U8),
+    parameter(3, "Inhibit time", Type::U16),
+    parameter(5, "Event timer", Type::U16),
+    parameter(6, "SYNC start value", Type::U8),
+];
+
+/// The count of a mapping, and the first of its entries.
+pub const MAPPED: [Item; 2] = [
+    parameter(0, "Number of mapped objects", Type::U8),
+    parameter(1, "Mapped object", Type::U32),
 ];
 
 /// Returns the name of an object of the communication area, such as `Device type`.

@@ -3,7 +3,7 @@
 use core::fmt::{Result, Write};
 
 use super::Decimal;
-use super::communication::{AREA, Area, Default, Item, Shape, Type};
+use super::communication::{AREA, Area, Default, Item, MAPPED, PARAMETERS, Shape, Type, highest};
 use crate::dictionary::{OBJECTS, Object, Pdo, Sub};
 use crate::identity;
 use crate::pdo::{Mapped, PdoDefault, RPDOS, TPDOS};
@@ -181,20 +181,16 @@ fn write_pdo(out: &mut dyn Write, number: u16, pdo: &PdoDefault, direction: Dire
     } | if pdo.enabled { 0 } else { INVALID };
     let cob_id = Default::PlusNodeId(u32::from(pdo.cob_id_base) | flags);
     let transmission = Default::Hex(u32::from(pdo.transmission));
-    let rw = |subindex, name, data_type, default| Item {
-        subindex,
-        name,
-        data_type,
-        access: "rw",
-        default,
-        mappable: false,
+    let [cob, kind_of, inhibit, event, start] = PARAMETERS;
+    let cob = Item {
+        default: cob_id,
+        ..cob
     };
-    let cob = rw(1, "COB-ID", Type::U32, cob_id);
-    let transmission = rw(2, "Transmission type", Type::U8, transmission);
-    let inhibit = rw(3, "Inhibit time", Type::U16, Default::Hex(0));
-    let event = rw(5, "Event timer", Type::U16, Default::Hex(0));
-    let start = rw(6, "SYNC start value", Type::U8, Default::Hex(0));
-    let all = [cob, transmission, inhibit, event, start];
+    let kind_of = Item {
+        default: transmission,
+        ..kind_of
+    };
+    let all = [cob, kind_of, inhibit, event, start];
     let items = match direction {
         Direction::Receive => all.get(..2),
         Direction::Transmit => all.get(..),
@@ -207,15 +203,7 @@ fn write_pdo(out: &mut dyn Write, number: u16, pdo: &PdoDefault, direction: Dire
         what: "communication parameter",
     };
     name.open(out, index, items.len() + 1)?;
-    let highest = Item {
-        access: "const",
-        ..rw(
-            0,
-            "Highest subindex",
-            Type::U8,
-            Default::Hex(u32::from(last)),
-        )
-    };
+    let highest = highest(u32::from(last), "const");
     for item in [&highest].into_iter().chain(items) {
         writeln!(out, "\n[{index:04X}sub{:X}]", item.subindex)?;
         write_item(out, item)?;
@@ -252,25 +240,26 @@ impl Name {
 
 fn write_mapping(out: &mut dyn Write, index: u16, mapping: &[Mapped], name: &Name) -> Result {
     name.open(out, index, usize::from(ENTRIES) + 1)?;
-    let rw = |subindex, name, data_type, default| Item {
-        subindex,
-        name,
-        data_type,
-        access: "rw",
-        default,
-        mappable: false,
-    };
     writeln!(out, "\n[{index:04X}sub0]")?;
     let count = Default::Hex(mapping.len() as u32);
-    write_item(out, &rw(0, "Number of mapped objects", Type::U8, count))?;
+    let [number, object] = MAPPED;
+    write_item(
+        out,
+        &Item {
+            default: count,
+            ..number
+        },
+    )?;
     for subindex in 1..=ENTRIES {
         let mapped = mapping.get(usize::from(subindex) - 1);
         let raw = mapped.map_or(0, |mapped| mapped.to_raw());
         writeln!(out, "\n[{index:04X}sub{subindex:X}]")?;
-        write_item(
-            out,
-            &rw(subindex, "Mapped object", Type::U32, Default::Hex(raw)),
-        )?;
+        let entry = Item {
+            subindex,
+            default: Default::Hex(raw),
+            ..object
+        };
+        write_item(out, &entry)?;
     }
     Ok(())
 }
@@ -284,17 +273,9 @@ fn write_object(out: &mut dyn Write, object: &Object) -> Result {
         Shape::Record,
         object.subs.len() + 1,
     )?;
-    let highest = Default::Hex(u32::from(object.highest()));
+    let highest = highest(u32::from(object.highest()), "const");
     writeln!(out, "\n[{index:04X}sub0]")?;
-    let zero = Item {
-        subindex: 0,
-        name: "Highest subindex",
-        data_type: Type::U8,
-        access: "const",
-        default: highest,
-        mappable: false,
-    };
-    write_item(out, &zero)?;
+    write_item(out, &highest)?;
     object
         .subs
         .iter()

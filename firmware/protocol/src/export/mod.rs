@@ -12,7 +12,10 @@ use core::fmt;
 
 use crate::dictionary::Scale;
 
+#[cfg(test)]
+pub(crate) use communication::Shape;
 pub use communication::communication_name;
+pub(crate) use communication::{AREA, Item, MAPPED, PARAMETERS};
 pub use dbc::write_dbc;
 pub use eds::write_eds;
 pub use markdown::write_markdown;
