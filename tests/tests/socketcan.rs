@@ -13,6 +13,9 @@ mod chosen_nodes;
 #[path = "socketcan/nodes.rs"]
 mod nodes;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/python_canopen.rs"]
+mod python_canopen;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/support.rs"]
 mod support;
 #[cfg(target_os = "linux")]

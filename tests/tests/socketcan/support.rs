@@ -2,10 +2,14 @@
 
 use std::env;
 use std::io::Read;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use eel_protocol::Frame;
 use eel_tests::skip;
+use eel_transport::candump::{Line, parse_line};
+use serde_json::Value;
 
 /// Seconds after which something that must come is given up; generous for a slow guest.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -26,6 +30,83 @@ pub fn interface() -> Option<String> {
             None
         }
     }
+}
+
+/// Returns the workspace's folder.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Runs a script of tests/python with python-canopen and returns the JSON that it prints.
+pub fn script(name: &str, arguments: &[&str]) -> Value {
+    let output = python(&Path::new("tests/python").join(name), arguments);
+    serde_json::from_str(&output).unwrap_or_else(|error| panic!("{name}: {error}: {output}"))
+}
+
+/// Runs a Python program in the workspace's folder and returns what it prints.
+pub fn python(program: &Path, arguments: &[&str]) -> String {
+    let python = env::var("ANGUILLA_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let output = Command::new(&python)
+        .current_dir(root())
+        .arg(program)
+        .args(arguments)
+        .stderr(Stdio::inherit())
+        .output()
+        .unwrap_or_else(|error| panic!("{python}: {error}; `cargo xtask setup` makes one"));
+    let program = program.display();
+    assert!(
+        output.status.success(),
+        "{program} ended with {}",
+        output.status
+    );
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// Runs a program to its end and returns what it prints, on either way.
+pub fn run(words: &[&str]) -> String {
+    let (name, arguments) = words.split_first().expect("a program");
+    let output = Command::new(name)
+        .current_dir(root())
+        .args(arguments)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap_or_else(|error| panic!("{name}: {error}; `cargo xtask setup` gets it"));
+    let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+    assert!(
+        output.status.success(),
+        "{words:?} ended with {}: {text}",
+        output.status
+    );
+    text
+}
+
+/// Returns the path of a program of this workspace, built as this test is.
+pub fn own_program(name: &str) -> String {
+    let test = env::current_exe().expect("a path");
+    let folder = test.ancestors().nth(2).expect("target/debug");
+    let program = folder.join(name);
+    assert!(
+        program.is_file(),
+        "no {}; `cargo build -p {name}` makes it",
+        program.display()
+    );
+    program.to_str().expect("text").to_owned()
+}
+
+/// Returns the path of a client from the Rust registry.
+pub fn peer(name: &str) -> String {
+    let program = root().join("target/peers/bin").join(name);
+    program.to_str().expect("text").to_owned()
+}
+
+/// Reads the frames of a recording.
+pub fn frames_of(log: &str) -> Vec<Frame> {
+    log.lines()
+        .map(|line| match parse_line(line.as_bytes()) {
+            Ok(Line::Frame(record)) => record.frame,
+            other => panic!("{line}: {other:?}"),
+        })
+        .collect()
 }
 
 /// Another program that is stopped when the test ends.
