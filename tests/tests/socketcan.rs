@@ -10,6 +10,9 @@ mod can_utils;
 #[path = "socketcan/chosen_nodes.rs"]
 mod chosen_nodes;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/head.rs"]
+mod head;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/nodes.rs"]
 mod nodes;
 #[cfg(target_os = "linux")]
@@ -18,6 +21,9 @@ mod python_canopen;
 #[cfg(target_os = "linux")]
 #[path = "socketcan/support.rs"]
 mod support;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/swim.rs"]
+mod swim;
 #[cfg(target_os = "linux")]
 #[path = "socketcan/ten_nodes.rs"]
 mod ten_nodes;

@@ -118,11 +118,16 @@ pub struct Program {
 impl Program {
     /// Starts a program and reads what it writes later.
     pub fn start(words: &[&str]) -> Self {
+        Self::start_into(words, Stdio::piped())
+    }
+
+    /// Starts a program that writes into a file, or wherever.
+    pub fn start_into(words: &[&str], out: impl Into<Stdio>) -> Self {
         let (name, arguments) = words.split_first().expect("a program");
         let child = Command::new(name)
             .args(arguments)
             .stdin(Stdio::null())
-            .stdout(Stdio::piped())
+            .stdout(out)
             .spawn()
             .unwrap_or_else(|error| panic!("{name}: {error}; Debian has it in can-utils"));
         Self {
@@ -142,11 +147,12 @@ impl Program {
         );
     }
 
-    /// Waits until the program has ended and returns what it wrote.
+    /// Waits until the program has ended and returns what it wrote, unless that went elsewhere.
     pub fn output(mut self) -> String {
         let mut text = String::new();
-        let mut out = self.child.stdout.take().expect("its output is piped");
-        out.read_to_string(&mut text).expect("text");
+        if let Some(mut out) = self.child.stdout.take() {
+            out.read_to_string(&mut text).expect("text");
+        }
         self.child.wait().expect("it ends");
         text
     }
