@@ -10,11 +10,14 @@ mod can_utils;
 #[path = "socketcan/chosen_nodes.rs"]
 mod chosen_nodes;
 #[cfg(target_os = "linux")]
-#[path = "socketcan/head.rs"]
-mod head;
+#[path = "socketcan/dissect.rs"]
+mod dissect;
 #[cfg(target_os = "linux")]
 #[path = "socketcan/nodes.rs"]
 mod nodes;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/peers.rs"]
+mod peers;
 #[cfg(target_os = "linux")]
 #[path = "socketcan/python_canopen.rs"]
 mod python_canopen;

@@ -1,6 +1,7 @@
 //! The interface, and other programs beside the test.
 
 use std::env;
+use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -64,6 +65,19 @@ pub fn python(program: &Path, arguments: &[&str]) -> String {
 
 /// Runs a program to its end and returns what it prints, on either way.
 pub fn run(words: &[&str]) -> String {
+    let (succeeded, text) = run_somehow(words);
+    assert!(succeeded, "{words:?}: {text}");
+    text
+}
+
+/// Runs a program that must end with an error, and returns what it prints.
+pub fn fails(words: &[&str]) -> String {
+    let (succeeded, text) = run_somehow(words);
+    assert!(!succeeded, "{words:?}: {text}");
+    text
+}
+
+fn run_somehow(words: &[&str]) -> (bool, String) {
     let (name, arguments) = words.split_first().expect("a program");
     let output = Command::new(name)
         .current_dir(root())
@@ -71,13 +85,9 @@ pub fn run(words: &[&str]) -> String {
         .stdin(Stdio::null())
         .output()
         .unwrap_or_else(|error| panic!("{name}: {error}; `cargo xtask setup` gets it"));
-    let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
-    assert!(
-        output.status.success(),
-        "{words:?} ended with {}: {text}",
-        output.status
-    );
-    text
+    let text = [output.stdout, output.stderr].concat();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    (output.status.success(), text)
 }
 
 /// Returns the path of a program of this workspace, built as this test is.
@@ -118,16 +128,17 @@ pub struct Program {
 impl Program {
     /// Starts a program and reads what it writes later.
     pub fn start(words: &[&str]) -> Self {
-        Self::start_into(words, Stdio::piped())
+        Self::start_in(&root(), words)
     }
 
-    /// Starts a program that writes into a file, or wherever.
-    pub fn start_into(words: &[&str], out: impl Into<Stdio>) -> Self {
+    /// Starts a program in a folder and reads what it writes later.
+    pub fn start_in(folder: &Path, words: &[&str]) -> Self {
         let (name, arguments) = words.split_first().expect("a program");
         let child = Command::new(name)
+            .current_dir(folder)
             .args(arguments)
             .stdin(Stdio::null())
-            .stdout(out)
+            .stdout(Stdio::piped())
             .spawn()
             .unwrap_or_else(|error| panic!("{name}: {error}; Debian has it in can-utils"));
         Self {
@@ -147,12 +158,11 @@ impl Program {
         );
     }
 
-    /// Waits until the program has ended and returns what it wrote, unless that went elsewhere.
+    /// Waits until the program has ended and returns what it wrote.
     pub fn output(mut self) -> String {
         let mut text = String::new();
-        if let Some(mut out) = self.child.stdout.take() {
-            out.read_to_string(&mut text).expect("text");
-        }
+        let mut out = self.child.stdout.take().expect("its output is piped");
+        out.read_to_string(&mut text).expect("text");
         self.child.wait().expect("it ends");
         text
     }
@@ -162,6 +172,38 @@ impl Drop for Program {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// candump writing a file, which costs it little.
+pub struct Recording {
+    folder: PathBuf,
+    candump: Program,
+}
+
+impl Recording {
+    /// Starts to record, in a folder of this name.
+    pub fn start(interface: &str, name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).expect("a folder");
+        let before = listeners();
+        // -d tells of frames that the machine lost, which the large buffer is there to prevent.
+        let words = ["candump", "-l", "-d", "-r", "4000000", interface];
+        let candump = Program::start_in(&folder, &words);
+        wait_for_listeners(before, 1);
+        Self { folder, candump }
+    }
+
+    /// Ends it and returns the path of the file, and what is in it.
+    pub fn end(self) -> (PathBuf, String) {
+        self.candump.interrupt();
+        self.candump.output();
+        let mut files = fs::read_dir(&self.folder).expect("a folder");
+        let file = files.next().expect("a file").expect("a file").path();
+        let text = fs::read_to_string(&file).expect("text");
+        assert!(!text.contains("DROPCOUNT"), "this machine lost frames");
+        (file, text)
     }
 }
 
