@@ -6,13 +6,14 @@
 //! bus. There is no arbitration, no frame time and no receive FIFO: those of the host's bus hold.
 //!
 //! Time for the nodes is the number of ticks, so what they do depends on what they receive and in
-//! which tick, never on how late the host was. A host that falls behind first catches up; what is
-//! beyond [`CATCH_UP_TICKS`] is left out and counted.
+//! which tick, never on how late the host was. A host that falls behind first catches up, and each of
+//! the ticks made up for takes the frames that came in its own millisecond; what is beyond
+//! [`CATCH_UP_TICKS`] is left out and counted.
 
 mod pace;
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant as HostInstant};
+use std::time::{Duration, Instant as HostInstant, SystemTime, UNIX_EPOCH};
 
 use eel_protocol::{Frame, NodeId};
 use eel_transport::{Bus, BusError, Received};
@@ -26,6 +27,9 @@ pub use pace::{CATCH_UP_TICKS, Pace};
 
 /// Frames that are taken from the bus in one tick at most; the rest waits in the bus.
 const RECEIVED_PER_TICK: usize = 256;
+/// A frame that seems to come from farther ahead than this was there when the host's clock was set
+/// back: 1 s.
+const CLOCK_SET_NS: u64 = 1_000_000_000;
 /// Frames that wait to be sent while the bus takes none.
 const WAITING: usize = 1024;
 
@@ -53,6 +57,8 @@ pub struct Realtime<B> {
     /// What the nodes sent in their last tick, and which of them.
     local: Vec<(usize, Frame)>,
     incoming: Vec<Frame>,
+    /// What came after the millisecond that the last tick stood for.
+    held: Option<Received>,
     outgoing: VecDeque<Frame>,
     counters: Counters,
 }
@@ -91,6 +97,7 @@ impl<B: Bus> Realtime<B> {
             drives: [[Drive::Off; 3]; NODES],
             local: Vec::new(),
             incoming: Vec::new(),
+            held: None,
             outgoing: VecDeque::new(),
             counters: Counters::default(),
         }
@@ -108,8 +115,9 @@ impl<B: Bus> Realtime<B> {
         let start = HostInstant::now();
         let mut pace = Pace::default();
         while keep_going(&self.counters) {
-            for _ in 0..pace.due(start.elapsed()) {
-                self.tick()?;
+            let (due, now_ns) = (pace.due(start.elapsed()), host_ns());
+            for behind in (0..due).rev() {
+                self.tick_until(now_ns.saturating_sub(behind * TICK_NS))?;
             }
             self.counters.skipped = pace.skipped();
             let wait = pace.until_next(start.elapsed());
@@ -120,12 +128,17 @@ impl<B: Bus> Realtime<B> {
         Ok(self.counters)
     }
 
-    /// Does one tick of every node, and a millisecond of the plant.
+    /// Does one tick of every node, and a millisecond of the plant, with all frames that have come.
     ///
     /// # Errors
     /// What the bus fails with.
     pub fn tick(&mut self) -> Result<(), BusError> {
-        self.receive()?;
+        self.tick_until(u64::MAX)
+    }
+
+    /// Does one tick with the frames that came until a time of the host, in nanoseconds since 1970.
+    fn tick_until(&mut self, until_ns: u64) -> Result<(), BusError> {
+        self.receive(until_ns)?;
         let now = Instant::from_micros(self.counters.ticks * TICK_NS / 1_000);
         let (heard, mut frames, mut sent) = (std::mem::take(&mut self.local), vec![], vec![]);
         for (id, node) in &mut self.nodes {
@@ -164,11 +177,19 @@ impl<B: Bus> Realtime<B> {
         self.counters
     }
 
-    fn receive(&mut self) -> Result<(), BusError> {
+    fn receive(&mut self, until_ns: u64) -> Result<(), BusError> {
         self.incoming.clear();
-        while self.incoming.len() < RECEIVED_PER_TICK
-            && let Some(received) = self.bus.receive(Duration::ZERO)?
-        {
+        while self.incoming.len() < RECEIVED_PER_TICK {
+            let next = match self.held.take() {
+                Some(held) => Some(held),
+                None => self.bus.receive(Duration::ZERO)?,
+            };
+            let Some(received) = next else { break };
+            let ahead_ns = received.time_ns.saturating_sub(until_ns);
+            if (1..CLOCK_SET_NS).contains(&ahead_ns) {
+                self.held = Some(received);
+                break;
+            }
             // The host's reports of bus errors are for whoever watches the bus.
             self.incoming.extend(Received::frame(&received));
         }
@@ -195,6 +216,12 @@ impl<B: Bus> Realtime<B> {
         }
         Ok(())
     }
+}
+
+/// Returns the host's time in nanoseconds since 1970, as buses stamp frames with.
+fn host_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX))
 }
 
 #[cfg(test)]

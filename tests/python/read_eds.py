@@ -53,7 +53,9 @@ def main(eds):
         assert entries[0].default == len(entries) - 1
         for sub in range(1, len(entries)):
             entry = entries[sub]
-            line = f"{index:04X}:{sub} {entry.name} {entry.data_type} {scientific(entry.factor)} {entry.unit}"
+            # Where a program asks for "pose.yaw" it gets this entry.
+            assert dictionary[entry.qualname] is entry, entry.qualname
+            line = f"{index:04X}:{sub} {entry.qualname} {entry.data_type} {scientific(entry.factor)} {entry.unit}"
             print(line.rstrip())
 
 

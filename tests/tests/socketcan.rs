@@ -13,11 +13,23 @@ mod can_utils;
 #[path = "socketcan/chosen_nodes.rs"]
 mod chosen_nodes;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/dissect.rs"]
+mod dissect;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/nodes.rs"]
 mod nodes;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/peers.rs"]
+mod peers;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/python_canopen.rs"]
+mod python_canopen;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/support.rs"]
 mod support;
+#[cfg(target_os = "linux")]
+#[path = "socketcan/swim.rs"]
+mod swim;
 #[cfg(target_os = "linux")]
 #[path = "socketcan/ten_nodes.rs"]
 mod ten_nodes;

@@ -194,4 +194,52 @@ fn an_unconfigured_vertebra_is_silent_until_it_is_given_an_id_which_it_keeps() {
     // An id beyond the chain is refused, with the code for it.
     let answers = give_id(&mut nodes, &mut bus, 0x5EE1_0005, 11);
     assert_eq!(answers[1], [0x11, 1, 0, 0, 0, 0, 0, 0]);
+
+/// A bus whose frames came at times that the test says.
+struct Stamped(VecDeque<(u64, Frame)>, Vec<Frame>);
+
+impl Bus for Stamped {
+    fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+        self.1.push(*frame);
+        Ok(())
+    }
+
+    fn receive(&mut self, _timeout: Duration) -> Result<Option<Received>, BusError> {
+        Ok(self.0.pop_front().map(|(time_ns, frame)| Received {
+            time_ns,
+            content: eel_transport::Content::Frame(frame),
+            direction: None,
+        }))
+    }
+}
+
+#[test]
+fn a_host_that_was_late_gives_each_tick_the_frames_of_its_own_millisecond() {
+    const START_NS: u64 = 1_700_000_000_000_000_000;
+    let frame = |cob: Cob, data: &[u8]| Frame::standard(cob.id(), data).unwrap();
+    let mut came = VecDeque::from([(START_NS, frame(Cob::Nmt, &[1, 0]))]);
+    for beat in 1..=5 {
+        let time_ns = START_NS + u64::from(beat) * 10 * TICK_NS;
+        came.push_back((time_ns, frame(Cob::Sync, &[beat])));
+    }
+    let one = [NodeId::FIRST];
+    let bus = Stamped(came, Vec::new());
+    let mut nodes = Realtime::with_nodes(bus, &PlantConfig::default(), 1, &one);
+    nodes.tick_until(START_NS).unwrap();
+    // All five beats are in the queue already, and 60 ms are made up for.
+    let mut beats = Vec::new();
+    for tick in 1..=60 {
+        nodes.tick_until(START_NS + tick * TICK_NS).unwrap();
+        let poses = nodes.bus.1.drain(..);
+        let count = poses
+            .filter(|frame| frame.cob_id() == Some(Cob::Pose(1).id()))
+            .count();
+        beats.extend(std::iter::repeat_n(tick, count));
+    }
+    assert_eq!(beats, [10, 20, 30, 40, 50]);
+    // A clock that was set back holds nothing up.
+    let late = START_NS + 3_600_000_000_000;
+    nodes.bus.0.push_back((late, frame(Cob::Sync, &[6])));
+    nodes.tick_until(START_NS + 61 * TICK_NS).unwrap();
+    assert_eq!(nodes.counters().received, 7);
 }

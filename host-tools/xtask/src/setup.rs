@@ -18,7 +18,7 @@ struct Tool {
 }
 
 /// What the tests need beyond cargo and the cross compiler.
-const TOOLS: [Tool; 8] = [
+const TOOLS: [Tool; 9] = [
     Tool {
         purpose: "running images",
         witness: "qemu-system-arm",
@@ -40,6 +40,11 @@ const TOOLS: [Tool; 8] = [
         package: "can-utils",
     },
     Tool {
+        purpose: "dissecting recordings",
+        witness: "tshark",
+        package: "tshark",
+    },
+    Tool {
         purpose: "a vcan0 without root",
         witness: "linux.uml",
         package: "user-mode-linux",
@@ -58,6 +63,27 @@ const TOOLS: [Tool; 8] = [
         purpose: "Python environments",
         witness: "/usr/share/doc/python3-venv",
         package: "python3-venv",
+    },
+];
+
+/// A CANopen client from the Rust registry, which knows nothing of this project.
+struct Peer {
+    package: &'static str,
+    version: &'static str,
+    program: &'static str,
+}
+
+/// Clients that the vertebrae are tested with.
+const PEERS: [Peer; 2] = [
+    Peer {
+        package: "canopen-cli",
+        version: "0.6.1",
+        program: "canopen",
+    },
+    Peer {
+        package: "zencan-cli",
+        version: "0.0.5",
+        program: "zencan-cli",
     },
 ];
 
@@ -83,6 +109,12 @@ pub fn prepare() -> Result<()> {
         lacking += 1;
         println!("missing: a Python environment ({error:#})");
     }
+    for peer in &PEERS {
+        if let Err(error) = peer.prepare() {
+            lacking += 1;
+            println!("missing: {} ({error:#})", peer.program);
+        }
+    }
     if lacking > 0 && is_ci() {
         bail!("{lacking} tools are missing, which is a failure where CI is set");
     }
@@ -101,6 +133,33 @@ impl Tool {
                 || process::succeeds(command("python3").args(["-c", "import venv, ensurepip"]));
         }
         process::find(self.witness).is_some()
+    }
+}
+
+impl Peer {
+    /// Builds the client into target/peers, where it is not there yet in this version.
+    fn prepare(&self) -> Result<()> {
+        let folder = clean_root().join("target/peers");
+        let Self {
+            package,
+            version,
+            program,
+        } = self;
+        let installed = fs::read_to_string(folder.join(".crates.toml")).unwrap_or_default();
+        let is_named = installed.contains(&format!("\"{package} {version} "));
+        if is_named && folder.join("bin").join(program).is_file() {
+            return Ok(());
+        }
+        println!("building {package} {version}");
+        // In a hurry: its speed does not matter, and half the time goes into optimising it.
+        run(process::cargo()
+            .args(["install", package, "--version", version, "--locked"])
+            .args(["--quiet", "--debug", "--force", "--bin", program, "--root"])
+            .arg(&folder)
+            .env("CARGO_PROFILE_DEV_DEBUG", "0")
+            .env("CARGO_TARGET_DIR", folder.join("build")))?;
+        fs::remove_dir_all(folder.join("build"))?;
+        Ok(())
     }
 }
 

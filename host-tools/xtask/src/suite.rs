@@ -150,8 +150,9 @@ fn run_tests() -> Result<()> {
     run(&mut tests)
 }
 
-/// Runs the tests that need a vcan0 beside one.
+/// Runs the tests that need a vcan0 beside one, with the programs that they start.
 fn run_vcan_tests() -> Result<()> {
+    run(cargo().args(["build", "--package", "hil-sim", "--package", "eel"]))?;
     let arguments = [
         "test",
         "--workspace",

@@ -138,7 +138,10 @@ impl Guest {
              mount -t tmpfs tmpfs /run\n\
              # What is written reaches the host at once, so that output is seen as it comes.\n\
              echo 5 >/proc/sys/vm/dirty_writeback_centisecs\n\
-             echo 5 >/proc/sys/vm/dirty_expire_centisecs\n",
+             echo 5 >/proc/sys/vm/dirty_expire_centisecs\n\
+             # Who is slow to receive frames loses none.\n\
+             echo 16777216 >/proc/sys/net/core/rmem_max\n\
+             echo 16777216 >/proc/sys/net/core/rmem_default\n",
         );
         for module in modules {
             script += &format!("{insmod} {}\n", quote(module.display()));

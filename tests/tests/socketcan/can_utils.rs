@@ -3,11 +3,13 @@
 use std::process::Command;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use eel_protocol::Frame;
+use eel_protocol::{Frame, NodeId};
 use eel_transport::candump::{Line, parse_frame, parse_line};
 use eel_transport::{Bus, BusError, SocketBus, frame_bits, open};
 
-use crate::support::{PATIENCE, Program, interface, listeners, wait_for_listeners};
+use crate::nodes::Nodes;
+use crate::python_canopen::check_nmt;
+use crate::support::{PATIENCE, Program, interface, listeners, run, script, wait_for_listeners};
 
 /// Frames of all kinds; remote frames ask for nothing, as canbusload counts data they don't have.
 const FRAMES: [&str; 10] = [
@@ -119,4 +121,25 @@ fn canbusload_counts_the_same_bits() {
 fn a_missing_interface_is_told_from_a_missing_kernel_module() {
     let Some(_) = interface() else { return };
     assert!(matches!(open("vcan87"), Err(BusError::NoInterface { name }) if name == "vcan87"));
+}
+
+/// Random frames of every kind as fast as they go, among them commands, SDO requests and SYNCs.
+#[test]
+fn vertebrae_live_through_a_storm_of_random_frames() {
+    const FRAMES: u64 = 20_000;
+    let Some(name) = interface() else { return };
+    let chosen = [3, 5].map(|id| NodeId::new(id).unwrap());
+    let nodes = Nodes::start(&name, chosen.to_vec());
+    let count = FRAMES.to_string();
+    for kind in [&[][..], &["-e"], &["-R"]] {
+        // -p waits where the queue is full.
+        let words = ["cangen", &name, "-g", "0", "-p", "10", "-n", &count];
+        run(&[&words, kind].concat());
+    }
+    // Whatever they were told, a reset makes them what they were.
+    run(&["cansend", &name, "000#8100"]);
+    check_nmt(&script("nmt.py", &[&name]));
+    let counters = nodes.end();
+    assert_eq!(counters.dropped, 0);
+    println!("{counters:?}");
 }

@@ -1,31 +1,9 @@
 //! Ten vertebrae on a real interface, met by python-canopen and watched by candump.
 
-use std::env;
-use std::process::{Command, Stdio};
-
-use eel_protocol::{Cob, Frame, NodeId, VERTEBRAE, identity};
-use eel_transport::candump::{Line, parse_line};
-use serde_json::Value;
+use eel_protocol::{Cob, NodeId, VERTEBRAE, identity};
 
 use crate::nodes::Nodes;
-use crate::support::{Program, interface, listeners, wait_for_listeners};
-
-/// Runs the Python script and returns what it found by node id.
-fn meet(interface: &str) -> Value {
-    let python = env::var("ANGUILLA_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/python/ten_nodes.py");
-    let output = Command::new(&python)
-        .args([script, interface])
-        .stderr(Stdio::inherit())
-        .output()
-        .unwrap_or_else(|error| panic!("{python}: {error}; `cargo xtask setup` makes one"));
-    assert!(
-        output.status.success(),
-        "{script} ended with {}",
-        output.status
-    );
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
+use crate::support::{Program, frames_of, interface, listeners, script, wait_for_listeners};
 
 #[test]
 fn python_canopen_meets_ten_vertebrae_and_candump_sees_them() {
@@ -34,7 +12,7 @@ fn python_canopen_meets_ten_vertebrae_and_candump_sees_them() {
     let candump = Program::start(&["candump", "-L", &name]);
     wait_for_listeners(before, 1);
     let nodes = Nodes::start(&name, NodeId::all().collect());
-    let found = meet(&name);
+    let found = script("ten_nodes.py", &[&name]);
     let counters = nodes.end();
     candump.interrupt();
     let log = candump.output();
@@ -56,13 +34,7 @@ fn python_canopen_meets_ten_vertebrae_and_candump_sees_them() {
         "every node is one of its own"
     );
 
-    let frames: Vec<Frame> = log
-        .lines()
-        .map(|line| match parse_line(line.as_bytes()) {
-            Ok(Line::Frame(record)) => record.frame,
-            other => panic!("{line}: {other:?}"),
-        })
-        .collect();
+    let frames = frames_of(&log);
     for node in 1..=VERTEBRAE {
         let of = |cob: Cob| {
             frames

@@ -293,9 +293,7 @@ fn write_sub(out: &mut dyn Write, object: &Object, sub: &Sub) -> Result {
     writeln!(
         out,
         "\n[{:04X}sub{:X}]\nParameterName={}",
-        object.index,
-        sub.subindex,
-        object.dotted(sub)
+        object.index, sub.subindex, sub.name
     )?;
     let is_domain = sub.data_type.is_domain();
     let shape = if is_domain {
