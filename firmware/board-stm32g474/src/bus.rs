@@ -15,7 +15,7 @@ use embassy_futures::select::{Either, select};
 use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::filter::{Action, Filter, FilterType, StandardFilter};
 use embassy_stm32::can::frame::Header;
-use embassy_stm32::can::{Can, CanConfigurator, CanRx, CanTx, Frame as HalFrame};
+use embassy_stm32::can::{Can, CanConfigurator, CanRx, CanTx, Frame as HalFrame, Properties};
 use embassy_stm32::can::{IT0InterruptHandler, IT1InterruptHandler};
 use embassy_stm32::peripherals::*;
 use embassy_stm32::{Peri, bind_interrupts, pac};
@@ -68,7 +68,7 @@ pub struct Connections {
 }
 
 /// Starts the controller.
-pub fn start(connections: Connections, node: NodeId) -> Can<'static> {
+pub fn start(connections: Connections, node: Option<NodeId>) -> Can<'static> {
     let Connections {
         can,
         receive,
@@ -84,34 +84,38 @@ pub fn start(connections: Connections, node: NodeId) -> Can<'static> {
         .set_tx_buffer_mode(TxBufferMode::Fifo)
         .set_automatic_bus_off_recovery(false);
     bus.set_config(config);
-    bus.properties().set_standard_filters(&filters(node));
+    hear(bus.properties(), node);
     bus.into_normal_mode()
 }
 
-/// Lists what this vertebra hears, which is what its node acts on and what the simulator's vertebrae
-/// hear; the controller drops everything else.
-fn filters(node: NodeId) -> [StandardFilter; 28] {
-    let exact = |cob: Cob| Filter {
-        filter: FilterType::BitMask {
-            filter: cob.id(),
-            mask: 0x7FF,
-        },
-        action: Action::StoreInFifo0,
-    };
-    let node = node.get();
+/// Lets pass what a vertebra with this node id hears, which is what its node acts on by default and
+/// what the simulator's vertebrae hear; the controller drops everything else.
+pub fn hear(controller: &Properties, node: Option<NodeId>) {
     let mut filters = [StandardFilter::disable(); 28];
-    let heard = [
+    let always = [
         Cob::Nmt,
         Cob::Sync,
-        Cob::Target(node),
-        Cob::Moment(node),
-        Cob::SdoRequest(node),
+        Cob::Time,
         Cob::Heartbeat(HEAD_NODE),
+        Cob::LssRequest,
     ];
-    for (slot, cob) in filters.iter_mut().zip(heard) {
-        *slot = exact(cob);
+    let own = node.map(NodeId::get).into_iter().flat_map(|node| {
+        [
+            Cob::Target(node),
+            Cob::Moment(node),
+            Cob::SdoRequest(node),
+        ]
+    });
+    for (slot, cob) in filters.iter_mut().zip(always.into_iter().chain(own)) {
+        *slot = Filter {
+            filter: FilterType::BitMask {
+                filter: cob.id(),
+                mask: 0x7FF,
+            },
+            action: Action::StoreInFifo0,
+        };
     }
-    filters
+    controller.set_standard_filters(&filters);
 }
 
 /// Counts a frame that is lost.

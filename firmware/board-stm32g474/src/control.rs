@@ -3,15 +3,18 @@
 use core::array::from_fn;
 
 use eel_drivers::Orientation;
+use eel_protocol::NodeId;
 use eel_units::{Duration as Span, Instant as Moment};
+use eel_vertebra::store::{StoreError, Stored};
 use eel_vertebra::{Event, Sample, Settings, Vertebra, turn};
+use embassy_stm32::can::Properties;
 use embassy_time::{Duration, Instant, Ticker};
 
 use crate::bridges::{self, Bridges};
 use crate::currents::Currents;
 use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
-use crate::{bus, liveness};
+use crate::{bus, liveness, storage};
 
 /// How the motors and their encoders are built in. The one table of signs: [`measure`] turns what
 /// comes from the sensors by it, [`Bridges::apply`] what goes to the bridges.
@@ -27,11 +30,23 @@ pub struct Hardware {
     pub counters: crate::sensors::CounterConnections,
     /// Crank encoders.
     pub cranks: CrankConnections,
+    /// What the CAN controller lets pass.
+    pub filters: Properties,
+}
+
+/// What the vertebra is made of.
+pub struct Birth {
+    /// What the board says.
+    pub settings: Settings,
+    /// What the flash says.
+    pub stored: Stored,
+    /// What led to the start.
+    pub cause: Start,
 }
 
 /// Runs the vertebra; after a failure it stays stopped until the head has sent a fault reset.
 #[embassy_executor::task]
-pub async fn run(hardware: Hardware, settings: Settings, start: Start) {
+pub async fn run(hardware: Hardware, birth: Birth) {
     let (crank_bus, select) = hardware.cranks.start();
     let cranks = Cranks::new(&crank_bus, select);
     let bridges = Bridges::new(hardware.bridges, ORIENTATIONS);
@@ -49,9 +64,15 @@ pub async fn run(hardware: Hardware, settings: Settings, start: Start) {
         currents.take();
         liveness::CONTROL.advance();
     }
-    let mut vertebra = match start {
-        Start::Ordered => Vertebra::new(settings, now()),
-        Start::Failed => Vertebra::after_failure(settings, now()),
+    let filters = hardware.filters;
+    let Birth {
+        settings,
+        stored,
+        cause,
+    } = birth;
+    let mut vertebra = match cause {
+        Start::Ordered => Vertebra::with_stored(settings, &stored, now()),
+        Start::Failed => Vertebra::after_failure(settings, &stored, now()),
     };
     loop {
         ticker.next().await;
@@ -60,7 +81,8 @@ pub async fn run(hardware: Hardware, settings: Settings, start: Start) {
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
         let drives = turn(&mut vertebra, now(), frames, &sample, bus::send);
         bridges.apply(drives);
-        report(&mut vertebra);
+        report(&mut vertebra, &filters);
+        store(&mut vertebra);
         let (received, transmitted) = bus::overruns();
         vertebra.note_overruns(received, transmitted);
         let micros = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
@@ -97,8 +119,20 @@ fn measure(
     }
 }
 
-/// Logs what happened.
-fn report(vertebra: &mut Vertebra) {
+/// Brings what is to be stored to the main thread, and the outcome back.
+fn store(vertebra: &mut Vertebra) {
+    if let Some(outcome) = storage::outcome() {
+        vertebra.finish_store(now(), outcome);
+    }
+    if let Some(record) = vertebra.poll_store()
+        && !storage::ask(record)
+    {
+        vertebra.finish_store(now(), Err(StoreError::Flash));
+    }
+}
+
+/// Logs what happened, and lets the identifiers of a new node id pass.
+fn report(vertebra: &mut Vertebra, filters: &Properties) {
     while let Some(event) = vertebra.poll_event() {
         match event {
             Event::State { from, to } => defmt::info!("{=str} -> {=str}", from.name(), to.name()),
@@ -106,6 +140,10 @@ fn report(vertebra: &mut Vertebra) {
                 defmt::warn!("{=str} ({=u16:#06x})", emergency.name, emergency.code);
             }
             Event::Reset => defmt::info!("reset by the head"),
+            Event::NodeId(node) => {
+                defmt::info!("node id {=u8} by LSS", node.map_or(0, NodeId::get));
+                bus::hear(filters, node);
+            }
         }
     }
 }

@@ -11,6 +11,8 @@ use embassy_stm32::pac;
 use crate::bridges;
 
 const MAGIC: u32 = 0x0EE1_DEAD;
+/// Number of the NMI.
+pub const NMI: i16 = -14;
 
 /// What led to this start.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -104,6 +106,11 @@ fn stop(line: u32, address: u32) -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
+/// Ends the program for an interrupt that nobody expects.
+pub fn stop_for_interrupt(interrupt: i16) -> ! {
+    stop(0, interrupt.unsigned_abs().into())
+}
+
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     stop(info.location().map_or(0, core::panic::Location::line), 0)
@@ -118,5 +125,5 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 // SAFETY: as above.
 #[exception]
 unsafe fn DefaultHandler(interrupt: i16) -> ! {
-    stop(0, interrupt.unsigned_abs().into())
+    stop_for_interrupt(interrupt)
 }

@@ -11,6 +11,7 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, Peripherals, interrupt as handler, uid};
 
 use crate::sensors::{CounterConnections, CrankConnections, ThermistorConnections, Thermistors};
+use crate::storage::Storage;
 use crate::{bridges, bus, clocks, control, currents, failure, slow};
 
 /// Time without a sign of life after which the chip resets, by a clock that is right to 10 %.
@@ -44,22 +45,26 @@ fn main() -> ! {
     let cause = failure::take_start();
     let peripherals = embassy_stm32::init(clocks::configuration());
     clocks::guard();
-    start(peripherals, cause);
+    let mut storage = start(peripherals, cause);
     loop {
+        storage.serve();
         cortex_m::asm::wfi();
     }
 }
 
-/// Starts every task; without a node number none, and the bridges stay off.
-fn start(p: Peripherals, cause: failure::Start) {
-    let Some(node) = read_node(p.PA2, p.PA3, p.PB9, p.PB11) else {
-        defmt::error!("the switches show no node number from 1 to 10");
-        return;
+/// Starts every task and returns what the main thread does.
+fn start(p: Peripherals, cause: failure::Start) -> Storage {
+    let mut storage = Storage::new(p.FLASH);
+    let stored = storage.load();
+    let settings = Settings {
+        node: read_node(p.PA2, p.PA3, p.PB9, p.PB11),
+        ..Settings::unconfigured(serial())
     };
-    let settings = Settings::prototype(node, serial());
+    // What LSS has stored outranks the switches.
+    let node = stored.node().or(settings.node);
     defmt::info!(
         "vertebra {=u8}, serial {=u32:#010x}",
-        node.get(),
+        node.map_or(0, NodeId::get),
         settings.serial
     );
 
@@ -81,7 +86,7 @@ fn start(p: Peripherals, cause: failure::Start) {
         receive: p.PA11,
         transmit: p.PA12,
     };
-    let (transmit, receive, _) = bus::start(can, node).split();
+    let (transmit, receive, filters) = bus::start(can, node).split();
     spawn(&bus, bus::receive(receive));
     spawn(&bus, bus::transmit(transmit));
     let hardware = control::Hardware {
@@ -108,12 +113,19 @@ fn start(p: Peripherals, cause: failure::Start) {
             lines: (p.PA5, p.PA6, p.PA7),
             select: (p.PB13, p.PB14, p.PB15),
         },
+        filters,
     };
     // From here on, so that no task can hang unseen before the one that feeds it has begun.
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
-    spawn(&control, control::run(hardware, settings, cause));
+    let birth = control::Birth {
+        settings,
+        stored,
+        cause,
+    };
+    spawn(&control, control::run(hardware, birth));
     spawn(&slow, slow::run(thermistors, watchdog));
+    storage
 }
 
 /// Spawns a task, each of which is spawned once and so always has room.
@@ -124,7 +136,8 @@ fn spawn<S: Send>(spawner: &SendSpawner, task: Result<SpawnToken<S>, SpawnError>
     }
 }
 
-/// Reads the node number from the switches, which are closed for 1.
+/// Reads the node number from the switches, which are closed for 1; `None` for 0 and above 10, where the
+/// vertebra waits for LSS.
 fn read_node(
     one: Peri<'static, PA2>,
     two: Peri<'static, PA3>,

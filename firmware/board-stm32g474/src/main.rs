@@ -2,7 +2,8 @@
 //!
 //! It gives [`eel_vertebra::Vertebra`] a clock, a bus, sensors and bridges, and decides nothing
 //! itself. Three executors run in interrupts: the bus's above the control tick's, so that no frame
-//! waits for a turn, and that of everything slow below both. The main thread sleeps.
+//! waits for a turn, and that of everything slow below both. The main thread stores
+//! settings, and sleeps.
 //!
 //! | function | pins | parts assumed on the board |
 //! |---|---|---|
@@ -18,7 +19,7 @@
 //! | motor currents | PC0, PC1, PC2: ADC1_IN6–8 | 5 mΩ in line, INA240A2, half of VDDA at 0 A |
 //! | supply | PC3: ADC1_IN9 | 100 kΩ over 10 kΩ |
 //! | temperatures | PA4 board, PC4, PC5, PB2 motors: ADC2 | thermistors, see eel-drivers |
-//! | node number | PA2, PA3, PB9, PB11: 1, 2, 4, 8 | switches to ground; 1–10 |
+//! | node number | PA2, PA3, PB9, PB11: 1, 2, 4, 8 | switches to ground; 1–10, all open: LSS gives it |
 //! | crystal | PF0, PF1 | 24 MHz |
 //! | debugging | PA13, PA14 | SWD, RTT |
 //!
@@ -34,9 +35,13 @@
 //! the motors are free; after each but the power's and the reset pin's reset the vertebra is stopped
 //! until the head has sent a fault reset. So it is when a programmer has started the image.
 //!
+//! Settings and a node id given by LSS are kept in the last 4 KB of the flash, see `storage.rs`; option
+//! bit DBANK must be 1, as it leaves the factory.
+//!
 //! What is shown here by tests: that the image links with the pins' alternate functions as the HAL
 //! knows them, and, in QEMU and on the host, the drivers and the logic. What only a board can show,
-//! and no test here does: timing on the bus, the ADC's trigger, the break input, the watchdog.
+//! and no test here does: timing on the bus, the ADC's trigger, the break input, the watchdog,
+//! the flash.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
@@ -59,6 +64,8 @@ mod liveness;
 mod sensors;
 #[cfg(target_os = "none")]
 mod slow;
+#[cfg(target_os = "none")]
+mod storage;
 
 /// Says what to do: the image only runs on the board.
 #[cfg(not(target_os = "none"))]
