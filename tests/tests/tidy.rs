@@ -302,3 +302,38 @@ fn manifest_of(name: &str) -> String {
     };
     format!("{folder}/Cargo.toml")
 }
+
+/// What docs/bus.md says is shown by a test must be shown by one.
+#[test]
+fn the_conformance_list_names_tests_and_peers_that_exist() {
+    let root = root();
+    let list = fs::read_to_string(root.join("docs/bus.md")).unwrap();
+    let mut tests = String::new();
+    for entry in fs::read_dir(root.join("firmware/canopen/tests")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            tests.push_str(&fs::read_to_string(path).unwrap());
+        }
+    }
+    let rows = list.lines().filter(|line| line.starts_with("| "));
+    let mut named = 0;
+    for row in rows {
+        let columns: Vec<&str> = row.trim_matches('|').split(" | ").collect();
+        let [_, _, _, shown, peers] = columns[..] else {
+            continue;
+        };
+        for name in quoted(shown) {
+            assert!(tests.contains(&format!("fn {name}(")), "no test {name}");
+            named += 1;
+        }
+        for script in quoted(peers) {
+            assert!(root.join("tests/python").join(script).is_file(), "no {script}");
+        }
+    }
+    assert!(named > 40, "{named} tests are named");
+}
+
+/// Returns what stands between backquotes.
+fn quoted(text: &str) -> impl Iterator<Item = &str> {
+    text.split('`').skip(1).step_by(2)
+}

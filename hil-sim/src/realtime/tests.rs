@@ -194,6 +194,7 @@ fn an_unconfigured_vertebra_is_silent_until_it_is_given_an_id_which_it_keeps() {
     // An id beyond the chain is refused, with the code for it.
     let answers = give_id(&mut nodes, &mut bus, 0x5EE1_0005, 11);
     assert_eq!(answers[1], [0x11, 1, 0, 0, 0, 0, 0, 0]);
+}
 
 /// A bus whose frames came at times that the test says.
 struct Stamped(VecDeque<(u64, Frame)>, Vec<Frame>);
