@@ -148,7 +148,7 @@ impl Node {
         self.send_emergencies(now_us);
     }
 
-    /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs, and at most eight
+    /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs, and at most four
     /// segments of an SDO block upload.
     pub fn tick(&mut self, now_us: u64, app: &mut impl Application) {
         if self.state == NmtState::Initialising {

@@ -6,8 +6,9 @@ use crate::Frame;
 
 /// How many frames wait to be sent, without those of the SDO server.
 pub(crate) const TRANSMIT_FRAMES: usize = 16;
-/// How many messages of the SDO server wait to be sent.
-pub(crate) const SDO_FRAMES: usize = 8;
+/// How many messages of the SDO server wait to be sent. A tick of 1 ms brings no more of a block upload,
+/// which is half of what the bus carries in that time.
+pub(crate) const SDO_FRAMES: usize = 4;
 
 /// Frames in order. When it is full the new frame is dropped, and counted. What is repeated
 /// anyway (a PDO, a heartbeat) never waits twice: new data takes the place of the old, so that a

@@ -185,7 +185,7 @@ fn an_acknowledgement_in_the_middle_of_a_block_starts_the_next() {
     line.app.domain = pattern(700);
     line.sdo(about(0xA4, DOMAIN, 1, 100));
     line.tell(START);
-    assert_eq!(line.pass_ms(2).len(), 16);
+    assert_eq!(line.pass_ms(4).len(), 16);
     line.tell(acknowledge(10, 90));
     let again = line.stream();
     assert_eq!(again.len(), 90);

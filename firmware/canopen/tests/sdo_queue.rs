@@ -6,7 +6,7 @@ mod streams;
 use streams::blocks::{START, acknowledge};
 use streams::{DOMAIN, GENERAL, Line, TIMEOUT, VALUE, abort, about, pattern};
 
-/// An Operational node in the middle of a block upload, with eight segments in its queue.
+/// An Operational node in the middle of a block upload, with four segments in its queue.
 fn streaming() -> Line {
     let mut line = Line::new();
     line.app.domain = pattern(2_000);
@@ -28,23 +28,23 @@ fn pdos_and_emergencies_overtake_a_block_upload() {
     line.node.emergency(line.now_us, 0x1000, 1, [0; 5]);
     let order = cob_ids(&mut line);
     assert_eq!(order[..2], [0x185, 0x085]);
-    assert_eq!(order[2..], [0x585; 8]);
+    assert_eq!(order[2..], [0x585; 4]);
     // The segments themselves keep their order.
     line.node.tick(line.now_us, &mut line.app);
-    assert_eq!(line.node.poll_transmit().unwrap().data()[0], 9);
+    assert_eq!(line.node.poll_transmit().unwrap().data()[0], 5);
     line.hear(0x080, &[]);
     assert_eq!(line.node.poll_transmit().unwrap().cob_id(), Some(0x185));
     let rest = line.messages();
     let numbers: Vec<u8> = rest.iter().map(|segment| segment[0]).collect();
-    assert_eq!(numbers, [10, 11, 12, 13, 14, 15, 16]);
+    assert_eq!(numbers, [6, 7, 8]);
 }
 
 #[test]
-fn a_tick_makes_eight_segments_at_most() {
+fn a_tick_makes_four_segments_at_most() {
     let mut line = streaming();
-    for number in [1, 9, 17] {
+    for number in [1, 5, 9] {
         let made = line.messages();
-        assert_eq!(made.len(), 8);
+        assert_eq!(made.len(), 4);
         assert_eq!(made[0][0], number);
         line.node.tick(line.now_us, &mut line.app);
     }
@@ -52,8 +52,8 @@ fn a_tick_makes_eight_segments_at_most() {
     for _ in 0..5 {
         line.node.tick(line.now_us, &mut line.app);
     }
-    assert_eq!(line.app.read, 4 * 8 * 7);
-    assert_eq!(line.messages().len(), 8);
+    assert_eq!(line.app.read, 4 * 4 * 7);
+    assert_eq!(line.messages().len(), 4);
     assert_eq!(line.node.counters().transmit_dropped, 0);
 }
 
@@ -109,7 +109,7 @@ fn answers_that_find_no_room_are_counted() {
         line.hear(0x605, &about(0x40, 0x3000, subindex, 0));
     }
     let said = line.messages();
-    assert_eq!(said.len(), 8);
-    assert_eq!(said[7][3], 7, "the newer ones were dropped");
-    assert_eq!(line.node.counters().transmit_dropped, 2);
+    assert_eq!(said.len(), 4);
+    assert_eq!(said[3][3], 3, "the newer ones were dropped");
+    assert_eq!(line.node.counters().transmit_dropped, 6);
 }
