@@ -99,13 +99,10 @@ pub fn hear(controller: &Properties, node: Option<NodeId>) {
         Cob::Heartbeat(HEAD_NODE),
         Cob::LssRequest,
     ];
-    let own = node.map(NodeId::get).into_iter().flat_map(|node| {
-        [
-            Cob::Target(node),
-            Cob::Moment(node),
-            Cob::SdoRequest(node),
-        ]
-    });
+    let own = node
+        .map(NodeId::get)
+        .into_iter()
+        .flat_map(|node| [Cob::Target(node), Cob::Moment(node), Cob::SdoRequest(node)]);
     for (slot, cob) in filters.iter_mut().zip(always.into_iter().chain(own)) {
         *slot = Filter {
             filter: FilterType::BitMask {

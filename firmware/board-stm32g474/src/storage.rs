@@ -13,7 +13,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::asm;
 use cortex_m_rt::exception;
 use eel_vertebra::store::{Record, Store, StoreError, Stored};
-use embassy_stm32::flash::{Blocking, Flash, FLASH_SIZE, WRITE_SIZE};
+use embassy_stm32::flash::{Blocking, FLASH_SIZE, Flash, WRITE_SIZE};
 use embassy_stm32::pac;
 use embassy_stm32::{Peri, peripherals::FLASH};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;

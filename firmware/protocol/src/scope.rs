@@ -2,7 +2,7 @@
 
 use eel_canopen::Mapped;
 
-use crate::dictionary::{self, Object, Sub};
+use crate::dictionary::{self, Lean};
 
 /// The layout of a capture; another one has another number.
 pub const SCOPE_VERSION: u8 = 1;
@@ -213,14 +213,14 @@ impl ScopeHeader {
 
 /// Returns the entry that a channel captures: a number that may be read, in its whole length; `None`
 /// for any other.
-pub fn captured(channel: u32) -> Option<(&'static Object, &'static Sub)> {
+pub fn captured(channel: u32) -> Option<&'static Lean> {
     let Mapped {
         index,
         subindex,
         bits,
     } = Mapped::from_raw(channel);
-    let (object, sub) = dictionary::find(index, subindex).ok()?;
-    (!sub.data_type.is_domain() && sub.data_type.bits() == bits).then_some((object, sub))
+    let entry = dictionary::lean(index, subindex).ok()?;
+    (!entry.data_type.is_domain() && entry.data_type.bits() == bits).then_some(entry)
 }
 
 #[cfg(test)]
@@ -261,8 +261,8 @@ mod tests {
 
     #[test]
     fn a_channel_captures_numbers_in_their_length_only() {
-        let (object, sub) = captured(0x2010_0110).unwrap();
-        assert_eq!((object.name, sub.name), ("pose", "yaw"));
+        let field = captured(0x2010_0110).map(|entry| entry.field);
+        assert_eq!(field, Some(dictionary::Field::PoseYaw));
         for wrong in [0, 0x2010_0120, 0x2010_0010, 0x2101_0100, 0x1001_0008, 7] {
             assert_eq!(captured(wrong), None, "{wrong:X}");
         }

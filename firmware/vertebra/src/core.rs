@@ -77,6 +77,7 @@ pub(crate) struct Core {
 
 impl Core {
     /// Starts at power-up.
+    #[inline(never)] // One copy in flash.
     pub fn new(settings: Settings, now: Instant) -> Self {
         let encoder = Encoder::new(&settings.motor);
         Self {

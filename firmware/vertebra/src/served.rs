@@ -3,6 +3,7 @@
 use eel_canopen::{Abort, Access, Application, Entry};
 use eel_protocol::PoseReport;
 use eel_protocol::dictionary::{self, Field};
+use eel_protocol::scope::captured;
 
 use crate::core::Core;
 use crate::records::Records;
@@ -33,7 +34,7 @@ impl Stream {
         if (index, subindex) == (STORE_EDS, 0) {
             return Ok(Self::Sheet);
         }
-        match dictionary::find(index, subindex)?.1.field {
+        match dictionary::lean(index, subindex)?.field {
             Field::RecordFreeze => Ok(Self::Freeze),
             Field::RecordScope => Ok(Self::Scope),
             Field::LinkData => Ok(Self::Link),
@@ -96,11 +97,11 @@ impl Served<'_> {
     /// Returns the number that a channel of the scope has in this tick. The pose is the present one: the
     /// entries of TPDO1 keep what was sent last.
     fn sampled(&self, channel: u32) -> i32 {
-        let Some((_, sub)) = eel_protocol::scope::captured(channel) else {
+        let Some(entry) = captured(channel) else {
             return 0;
         };
         let pose = &self.core.pose;
-        match sub.field {
+        match entry.field {
             Field::PoseYaw => i32::from(pose.yaw.to_tenth_milliradians()),
             Field::PosePitch => i32::from(pose.pitch.to_tenth_milliradians()),
             Field::PoseRoll => i32::from(pose.roll.to_tenth_milliradians()),
@@ -129,10 +130,10 @@ impl Application for Served<'_> {
     fn read(&self, index: u16, subindex: u8, out: &mut [u8]) -> Result<usize, Abort> {
         let byte = match (index, subindex) {
             (STORE_FORMAT, 0) => PLAIN,
-            (_, 0) => dictionary::object(index).ok_or(Abort::NoObject)?.highest(),
+            (_, 0) => dictionary::highest(index)?,
             _ => {
-                let (_, sub) = dictionary::find(index, subindex)?;
-                return sub.data_type.encode(self.value(sub.field), out);
+                let entry = dictionary::lean(index, subindex)?;
+                return entry.data_type.encode(self.value(entry.field), out);
             }
         };
         *out.first_mut().ok_or(Abort::OutOfMemory)? = byte;
@@ -140,8 +141,8 @@ impl Application for Served<'_> {
     }
 
     fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
-        let (_, sub) = dictionary::find(index, subindex)?;
-        self.set(sub.field, sub.accept(data)?)
+        let entry = dictionary::lean(index, subindex)?;
+        self.set(entry.field, entry.accept(data)?)
     }
 
     fn rpdo_applied(&mut self, number: u8, cob_id: u16) {

@@ -161,6 +161,7 @@ impl Settings {
 /// The settings as the entries of the dictionary that may be written and stored.
 impl Settings {
     /// Returns the raw number of a setting; `None` for any other field.
+    #[inline(never)] // One copy in flash.
     pub(crate) fn value(&self, field: Field) -> Option<i64> {
         let (gains, limits) = (&self.gains, &self.limits);
         let [stiffness_x, stiffness_y, stiffness_z] = gains.stiffness.map(i64::from);
@@ -183,6 +184,7 @@ impl Settings {
     }
 
     /// Writes a setting whose value has been held against its bounds. Tells whether the field is one.
+    #[inline(never)] // One copy in flash.
     pub(crate) fn set(&mut self, field: Field, value: i64) -> bool {
         let angle = Angle::from_tenth_milliradians(value as i16);
         let (gains, limits) = (&mut self.gains, &mut self.limits);

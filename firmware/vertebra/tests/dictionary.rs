@@ -104,7 +104,8 @@ fn encode(data_type: DataType, value: i64) -> Vec<u8> {
 
 /// Returns the fields of the settings.
 fn settings() -> impl Iterator<Item = (u16, &'static Sub)> {
-    dictionary::settings().map(|(object, sub)| (object.index, sub))
+    dictionary::settings()
+        .map(|(index, subindex)| (index, dictionary::find(index, subindex).unwrap().1))
 }
 
 #[test]

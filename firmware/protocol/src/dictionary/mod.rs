@@ -5,12 +5,14 @@
 //! is written; EDS, DBC and the tables of the documentation come from it. A vertebra serves the
 //! entries by a `match` over [`Field`], so the compiler refuses a table entry that nobody serves.
 
+mod lean;
 mod table;
 
 use core::fmt;
 
-use eel_canopen::{Abort, Access, Entry};
+use eel_canopen::{Abort, Access};
 
+pub use lean::{Lean, entry, highest, lean};
 pub use table::{Field, OBJECTS};
 
 /// The record whose entries are settings.
@@ -194,35 +196,6 @@ impl DataType {
     }
 }
 
-impl Sub {
-    /// Returns what a CANopen node must know of the entry.
-    pub const fn entry(&self) -> Entry {
-        Entry {
-            length: self.data_type.length(),
-            domain: self.data_type.is_domain(),
-            access: self.access,
-            tpdo: matches!(self.pdo, Pdo::Transmit),
-            rpdo: matches!(self.pdo, Pdo::Receive),
-        }
-    }
-
-    /// Reads a number that was written to the entry and holds it against the entry's bounds.
-    ///
-    /// # Errors
-    /// [`Abort::ReadOnly`]; [`Abort::TooShort`] or [`Abort::TooLong`] for a wrong length;
-    /// [`Abort::ValueTooLow`] or [`Abort::ValueTooHigh`] outside the bounds.
-    pub fn accept(&self, bytes: &[u8]) -> Result<i64, Abort> {
-        if matches!(self.access, Access::Constant | Access::ReadOnly) {
-            return Err(Abort::ReadOnly);
-        }
-        match self.data_type.decode(bytes)? {
-            value if value < self.min => Err(Abort::ValueTooLow),
-            value if value > self.max => Err(Abort::ValueTooHigh),
-            value => Ok(value),
-        }
-    }
-}
-
 impl Object {
     /// Returns the highest subindex, which is what entry 0 holds.
     pub const fn highest(&self) -> u8 {
@@ -276,24 +249,6 @@ pub(crate) const fn lookup(index: u16, subindex: u8) -> Option<&'static Sub> {
     }
 }
 
-/// Describes an entry to a CANopen node; subindex 0 is a constant byte.
-///
-/// # Errors
-/// [`Abort::NoObject`] or [`Abort::NoSubindex`].
-pub fn entry(index: u16, subindex: u8) -> Result<Entry, Abort> {
-    if subindex == 0 {
-        object(index).ok_or(Abort::NoObject)?;
-        return Ok(Entry {
-            length: 1,
-            domain: false,
-            access: Access::Constant,
-            tpdo: false,
-            rpdo: false,
-        });
-    }
-    find(index, subindex).map(|(_, sub)| sub.entry())
-}
-
 /// Returns every entry with its record, in the order of the dictionary.
 pub fn entries() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clone {
     OBJECTS
@@ -301,12 +256,10 @@ pub fn entries() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clon
         .flat_map(|object| object.subs.iter().map(move |sub| (object, sub)))
 }
 
-/// Returns the entries that are settings: written while nothing moves, and stored.
-pub fn settings() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clone {
-    let object = object(GAINS);
-    object
-        .into_iter()
-        .flat_map(|object| object.subs.iter().map(move |sub| (object, sub)))
+/// Returns index and subindex of the entries that are settings: written while nothing moves, and stored.
+pub fn settings() -> impl Iterator<Item = (u16, u8)> + Clone {
+    let highest = highest(GAINS).unwrap_or_default();
+    (1..=highest).map(|subindex| (GAINS, subindex))
 }
 
 #[cfg(test)]

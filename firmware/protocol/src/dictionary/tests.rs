@@ -13,10 +13,17 @@ fn every_entry_is_found_where_it_stands_and_nothing_else_is() {
                 .find(|object| object.index == index)
                 .map(|object| object.subs.iter().find(|sub| sub.subindex == subindex));
             match (by_search, find(index, subindex)) {
-                (None, answer) => assert_eq!(answer, Err(Abort::NoObject)),
-                (Some(None), answer) => assert_eq!(answer, Err(Abort::NoSubindex)),
+                (None, answer) => {
+                    assert_eq!(answer, Err(Abort::NoObject));
+                    assert_eq!(lean(index, subindex), Err(Abort::NoObject));
+                }
+                (Some(None), answer) => {
+                    assert_eq!(answer, Err(Abort::NoSubindex));
+                    assert_eq!(lean(index, subindex), Err(Abort::NoSubindex));
+                }
                 (Some(Some(sub)), answer) => {
                     assert_eq!(answer.map(|(_, sub)| sub), Ok(sub));
+                    assert_eq!(lean(index, subindex), Ok(&sub.lean()));
                     found += 1;
                 }
             }
@@ -114,16 +121,19 @@ fn a_domain_has_no_number_and_says_so() {
 #[test]
 fn a_value_outside_the_bounds_is_refused_with_the_code_that_says_so() {
     let (_, yaw) = find(0x2020, 8).unwrap();
-    assert_eq!(yaw.accept(&5_236_i16.to_le_bytes()), Ok(5_236));
+    assert_eq!(yaw.lean().accept(&5_236_i16.to_le_bytes()), Ok(5_236));
     assert_eq!(
-        yaw.accept(&5_237_i16.to_le_bytes()),
+        yaw.lean().accept(&5_237_i16.to_le_bytes()),
         Err(Abort::ValueTooHigh)
     );
-    assert_eq!(yaw.accept(&(-1_i16).to_le_bytes()), Err(Abort::ValueTooLow));
-    assert_eq!(yaw.accept(&[1]), Err(Abort::TooShort));
-    assert_eq!(yaw.accept(&[1, 2, 3]), Err(Abort::TooLong));
+    assert_eq!(
+        yaw.lean().accept(&(-1_i16).to_le_bytes()),
+        Err(Abort::ValueTooLow)
+    );
+    assert_eq!(yaw.lean().accept(&[1]), Err(Abort::TooShort));
+    assert_eq!(yaw.lean().accept(&[1, 2, 3]), Err(Abort::TooLong));
     let (_, pose) = find(0x2010, 1).unwrap();
-    assert_eq!(pose.accept(&[0, 0]), Err(Abort::ReadOnly));
+    assert_eq!(pose.lean().accept(&[0, 0]), Err(Abort::ReadOnly));
 }
 
 #[test]

@@ -17,7 +17,7 @@ pub(crate) struct Link {
 impl Default for Link {
     fn default() -> Self {
         Self {
-            length: Field::LinkLength.sub().default as u32,
+            length: const { Field::LinkLength.sub().default as u32 },
             crc: 0,
             opened: 0,
             coming: Crc32::default(),

@@ -1,7 +1,7 @@
 //! What is kept over a loss of power, as bytes.
 
 use eel_canopen::STORED_PARAMETERS;
-use eel_protocol::dictionary::{self, Sub};
+use eel_protocol::dictionary;
 use eel_protocol::{Crc32, NodeId};
 use heapless::Vec;
 
@@ -44,16 +44,18 @@ impl Record {
     }
 
     /// Keeps the settings as they are.
+    #[inline(never)] // One copy in flash.
     pub(crate) fn keep_settings(&mut self, settings: &Settings) {
         self.settings.clear();
-        for (object, sub) in dictionary::settings() {
-            let Some(value) = settings.value(sub.field) else {
+        for (index, subindex) in dictionary::settings() {
+            let field = dictionary::lean(index, subindex).map(|entry| entry.field);
+            let Some(value) = field.ok().and_then(|field| settings.value(field)) else {
                 continue;
             };
-            let [low, high] = object.index.to_le_bytes();
+            let [low, high] = index.to_le_bytes();
             let [a, b, c, d] = (value as u32).to_le_bytes();
             // There is room: a test holds that the dictionary has fewer settings.
-            let entry = [low, high, sub.subindex, a, b, c, d];
+            let entry = [low, high, subindex, a, b, c, d];
             let _ = self.settings.extend_from_slice(&entry);
         }
     }
@@ -65,22 +67,24 @@ impl Record {
 
     /// Puts the kept settings in the place of those of `settings`. A setting that this firmware does not
     /// have is left out. Tells whether all others are within their bounds; if not, `settings` is as before.
+    #[inline(never)] // One copy in flash.
     pub(crate) fn apply_settings(&self, settings: &mut Settings) -> bool {
         let mut changed = *settings;
         let (entries, rest) = self.settings.as_chunks();
         for entry in entries {
             let &[low, high, subindex, number @ ..]: &[u8; SETTING] = entry;
             let index = u16::from_le_bytes([low, high]);
-            let Some(sub) = setting(index, subindex) else {
+            let is_known = dictionary::settings().any(|place| place == (index, subindex));
+            let Some(known) = dictionary::lean(index, subindex).ok().filter(|_| is_known) else {
                 continue;
             };
             let raw = u32::from_le_bytes(number);
-            let value = if sub.data_type.is_signed() {
+            let value = if known.data_type.is_signed() {
                 i64::from(raw as i32)
             } else {
                 i64::from(raw)
             };
-            if value < sub.min || value > sub.max || !changed.set(sub.field, value) {
+            if value < known.min || value > known.max || !changed.set(known.field, value) {
                 return false;
             }
         }
@@ -154,13 +158,6 @@ impl Record {
         };
         Some((u32::from_le_bytes([a, b, c, d]), record))
     }
-}
-
-/// Returns the entry that is a setting and stands there.
-fn setting(index: u16, subindex: u8) -> Option<&'static Sub> {
-    let (_, sub) = dictionary::settings()
-        .find(|(object, sub)| (object.index, sub.subindex) == (index, subindex))?;
-    Some(sub)
 }
 
 fn length(low: u8, high: u8) -> usize {
@@ -238,7 +235,8 @@ mod tests {
         let count = dictionary::settings().count();
         assert!(count <= SETTINGS);
         assert_eq!(record().settings.len(), SETTING * count);
-        for (_, sub) in dictionary::settings() {
+        for (index, subindex) in dictionary::settings() {
+            let (_, sub) = dictionary::find(index, subindex).unwrap();
             assert_eq!(prototype().value(sub.field), Some(sub.default));
         }
     }
