@@ -31,6 +31,8 @@ const OUT_OF_WORKSPACE: std::ops::Range<usize> = 2_000..2_300;
 const GARBAGE: std::ops::Range<usize> = 2_600..3_200;
 const BLIND: std::ops::Range<usize> = 3_400..3_410;
 const SILENCE: std::ops::Range<usize> = 3_800..7_000;
+/// When a client asks for a heartbeat every 20 ms, and for that to be stored.
+const STORED: usize = 6_500;
 /// When the vertebra is powered up again, among garbage.
 const SECOND_START: usize = 6_800;
 /// Longest time that QEMU may take.
@@ -148,6 +150,16 @@ fn spoil(inputs: Vec<Input>, node: NodeId) -> Vec<Step> {
         if BLIND.contains(&index) {
             input.sample.absolute[index % 3] = None;
             input.sample.supply = Voltage::from_millivolts(numbers.below(40_000) as i32);
+        }
+        if index == STORED {
+            let request = |data: [u8; 8]| {
+                Frame::standard(Cob::SdoRequest(node.get()).id(), &data).expect("eight bytes")
+            };
+            let requests = [
+                request([0x2B, 0x17, 0x10, 0, 20, 0, 0, 0]),
+                request([0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']),
+            ];
+            input.frames.extend(requests);
         }
         if index == SECOND_START {
             steps.push(Step::Start(Start {
@@ -272,6 +284,17 @@ fn check_that_much_happened(outputs: &[Output]) {
         "the script is too tame"
     );
     assert!(emergencies > 2 && answers > 20, "the script is too tame");
+    let stored = Frame::standard(
+        Cob::SdoResponse(RECORDED).id(),
+        &[0x60, 0x10, 0x10, 1, 0, 0, 0, 0],
+    );
+    assert!(frames().any(|frame| Some(*frame) == stored));
+    let heartbeats = outputs[SECOND_START..SECOND_START + 100]
+        .iter()
+        .flat_map(|output| &output.frames)
+        .filter(|it| matches!(node(it), Some(Cob::Heartbeat(_))))
+        .count();
+    assert!(heartbeats >= 4, "nothing was stored: {heartbeats}");
 }
 
 /// Runs the image, and returns its answers.
