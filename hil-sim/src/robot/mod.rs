@@ -330,6 +330,7 @@ fn vertebra_controller(id: NodeId) -> ControllerConfig {
         dual(Cob::Nmt, Cob::Sync),
         dual(Cob::Target(node), Cob::Moment(node)),
         dual(Cob::SdoRequest(node), Cob::Heartbeat(HEAD_NODE)),
+        dual(Cob::Time, Cob::LssRequest),
     ])
 }
 

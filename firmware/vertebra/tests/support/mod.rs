@@ -1,11 +1,14 @@
 //! A vertebra on a bench: a head that sends heartbeats, targets and SYNC, and a wrist that follows.
 #![allow(dead_code, reason = "each test file uses its own part of the bench")]
 
+pub mod sdo;
+
 use eel_canopen::{Frame, NmtCommand};
 use eel_kinematics::{Joints, Pose, Wrist};
 use eel_protocol::emergency::EmergencyReport;
 use eel_protocol::{Condition, Counter, HEAD_NODE, Mode, NodeId, PoseReport, State, Target};
 use eel_units::{Angle, Current, Duty, Instant, Temperature, Voltage};
+use eel_vertebra::store::{self, RamFlash, Store};
 use eel_vertebra::{Drive, Sample, Settings, Vertebra, turn};
 
 /// The vertebra under test is the third.
@@ -72,6 +75,8 @@ pub struct Bench {
     pub sent: Vec<Sent>,
     /// Frames to give to the vertebra in the next tick, before all others.
     pub extra: Vec<Frame>,
+    /// What keeps over a loss of power; it takes a tick to store something.
+    pub store: Store<RamFlash>,
     counter: Counter,
     beat: u8,
 }
@@ -102,6 +107,7 @@ impl Bench {
             drives: [Drive::Off; 3],
             sent: Vec::new(),
             extra: Vec::new(),
+            store: Store::new(RamFlash::new()),
             counter: Counter::default(),
             beat: 0,
         }
@@ -152,6 +158,12 @@ impl Bench {
             .push(Frame::standard(0, &[command as u8, 0]).unwrap());
     }
 
+    /// Takes the power away and gives it back; the flash keeps what it holds.
+    pub fn power_cycle(&mut self, settings: Settings) {
+        let stored = self.store.load();
+        self.vertebra = Vertebra::with_stored(settings, &stored, self.now());
+    }
+
     /// Returns the time.
     pub fn now(&self) -> Instant {
         Instant::from_micros(self.millis * 1_000)
@@ -188,6 +200,7 @@ impl Bench {
             &self.sample,
             |frame| sent.push(Sent { at, frame }),
         );
+        store::serve(&mut self.vertebra, &mut self.store, now);
         if self.follows
             && let Some(reference) = self.vertebra.reference()
         {
