@@ -2,7 +2,8 @@
 //!
 //! The program runs from bank 1, so that an erase (22 ms) or a write of bank 2 stalls nothing but
 //! whoever reads bank 2. It is done by the main thread, below every interrupt: turns, frames and the
-//! watchdog go on meanwhile. `memory.x` leaves the pages out of the program's flash.
+//! watchdog go on meanwhile, without the flash's data cache, which the chip demands to be off. `memory.x`
+//! leaves the pages out of the program's flash.
 //!
 //! A word that was torn by a loss of power may read as an error of two bits, which raises an NMI. While
 //! these pages are read that is noted and the read fails; [`eel_vertebra::store`] then takes the word for
@@ -126,6 +127,7 @@ impl ReadNorFlash for Pages {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
         TORN.store(false, Ordering::SeqCst);
         READING.store(true, Ordering::SeqCst);
+        asm::dsb();
         let outcome = self.0.blocking_read(START.saturating_add(offset), bytes);
         // The NMI of the last read has been taken when these are through.
         asm::dsb();

@@ -4,12 +4,13 @@ use std::boxed::Box;
 use std::println;
 use std::vec::Vec;
 
-use eel_protocol::NodeId;
+use eel_protocol::{NodeId, dictionary};
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 
 use super::*;
+use crate::settings::Settings;
 
 const WORDS: usize = 2 * RAM_PAGE / WORD;
 
@@ -329,4 +330,56 @@ fn a_record_that_was_damaged_is_not_believed_and_not_taken_for_none() {
         flip(&mut store, RAM_PAGE + at);
         assert_eq!(store.load(), Stored::Record(record(1)), "byte {at}");
     }
+}
+
+/// What is loaded may have been written by anything: a check that holds proves no sense.
+#[test]
+fn no_record_whatever_it_holds_makes_a_vertebra_with_settings_out_of_bounds() {
+    let mut random = Model::new(0xACE);
+    let (mut taken, mut refused) = (0, 0);
+    for _ in 0..3_000 {
+        let mut settings = Settings::unconfigured(1);
+        let mut expected = Vec::new();
+        for (index, subindex) in dictionary::settings() {
+            let entry = dictionary::lean(index, subindex).unwrap();
+            // Mostly within the bounds, of which few are that wide.
+            let span = (entry.max - entry.min + 1) as u64;
+            let inside = entry.min + (random.next() % span) as i64;
+            let value = match random.next() % 40 {
+                0 => i64::from(random.next() as i32),
+                _ => inside,
+            };
+            assert!(settings.set(entry.field, value));
+            expected.push(settings.value(entry.field));
+        }
+        let mut record = Record::default();
+        record.keep_settings(&settings);
+        for _ in 0..random.next() % 400 {
+            let _ = record.communication.push(random.next() as u8);
+        }
+        let mut store = Store::new(RamFlash::new());
+        store.save(&record).unwrap();
+        let now = Instant::ZERO;
+        let vertebra = Vertebra::with_stored(Settings::unconfigured(1), &store.load(), now);
+        let found: Vec<_> = dictionary::settings()
+            .map(|(index, subindex)| {
+                let entry = dictionary::lean(index, subindex).unwrap();
+                let value = vertebra.core.settings.value(entry.field).unwrap();
+                assert!(
+                    (entry.min..=entry.max).contains(&value),
+                    "{entry:?}: {value}"
+                );
+                Some(value)
+            })
+            .collect();
+        assert!(vertebra.core.settings.are_sound());
+        if found == expected {
+            taken += 1;
+        } else {
+            assert!(vertebra.core.settings_lost, "{expected:?} became {found:?}");
+            refused += 1;
+        }
+    }
+    println!("{taken} records taken, {refused} refused");
+    assert!(taken > 500 && refused > 500);
 }
