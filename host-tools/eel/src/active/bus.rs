@@ -5,7 +5,8 @@ use clap::Args;
 use eel_client::Client;
 use eel_transport::{Bus, Interface, interfaces};
 
-use super::{NoBus, Usage};
+use super::NoBus;
+use crate::usage::Usage;
 
 /// The variable that names the bus.
 const VARIABLE: &str = "EEL_BUS";

@@ -19,10 +19,10 @@ use crate::source;
 const TICK: Duration = Duration::from_millis(1);
 /// Frames that are taken from the bus between two calls.
 const RECEIVED_PER_TICK: usize = 512;
-/// Frames that wait to be sent while the bus takes none: more than a second's worth.
+/// Frames that wait to be sent while the bus takes none: more than those of that time.
 const WAITING: usize = 2_048;
 /// How long the bus may take no frame before the head gives up.
-const STUCK: Duration = Duration::from_secs(1);
+const STUCK: Duration = Duration::from_millis(500);
 /// Time between two status lines.
 const SHOWN: Duration = Duration::from_millis(500);
 /// After which time without a vertebra this is told.
