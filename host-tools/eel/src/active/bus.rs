@@ -108,11 +108,17 @@ fn choose(option: Option<&str>, variable: Option<&str>, all: &[Interface]) -> Re
                 .to_owned(),
         )
         .into()),
-        ([], [down, ..]) => Err(NoBus(format!(
-            "no CAN interface is up: `ip link set {down} up type can bitrate 1000000` as root (a \
-             vcan without type and bitrate)"
-        ))
-        .into()),
+        ([], [down, ..]) => {
+            let how = if down.starts_with("vcan") {
+                ""
+            } else {
+                " type can bitrate 1000000"
+            };
+            Err(NoBus(format!(
+                "no CAN interface is up: `ip link set {down} up{how}` as root"
+            ))
+            .into())
+        }
         (several, _) => Err(Usage(format!(
             "several CAN interfaces are up ({}): choose one with --bus or the variable {VARIABLE}",
             several.join(", ")
