@@ -248,7 +248,7 @@ impl Live {
             }
             let (node, text) = words(&event, acknowledged);
             match lines.iter_mut().find(|(other, _)| *other == text) {
-                Some((_, nodes)) => nodes.extend(node),
+                Some((_, nodes)) => nodes.extend(node.filter(|node| !nodes.contains(node))),
                 None => lines.push((text, node.into_iter().collect())),
             }
         }
