@@ -18,7 +18,7 @@ pub type AnyBus = Box<dyn Bus + Send>;
 #[derive(Debug, Args)]
 pub struct BusOption {
     /// The bus, such as can0; without it what EEL_BUS names, else the only CAN interface that is up
-    #[arg(short, long, value_name = "BUS")]
+    #[arg(short, long, value_name = "BUS", global = true)]
     pub bus: Option<String>,
 }
 
