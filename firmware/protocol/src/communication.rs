@@ -30,6 +30,20 @@ pub struct Entry {
     pub scale: Scale,
 }
 
+impl Entry {
+    /// Returns the short name of its type that tables print.
+    pub const fn type_name(&self) -> &'static str {
+        match self.type_code {
+            5 => "u8",
+            6 => "u16",
+            7 => "u32",
+            9 => "text",
+            15 => "domain",
+            _ => "",
+        }
+    }
+}
+
 /// A name, its entry, and the unit of the entry.
 struct Row(u16, u8, &'static str, Unit);
 

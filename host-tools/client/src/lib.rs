@@ -22,6 +22,8 @@ mod error;
 mod history;
 mod lss;
 mod nmt;
+#[cfg(test)]
+mod noise;
 mod scan;
 #[cfg(test)]
 mod script;

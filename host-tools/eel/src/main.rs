@@ -9,12 +9,15 @@ mod filter;
 mod json;
 mod listen;
 mod lss;
+mod object;
 mod report;
 mod sdo;
 mod service;
 mod source;
 mod stats;
 mod text;
+mod usage;
+mod value;
 mod wrist;
 
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write, stderr, stdout};

@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-use eel_protocol::dictionary;
+use eel_client::Multiplexor;
 use eel_protocol::export::communication_name;
 
-use crate::decode::decimals;
+use crate::object;
+use crate::value::Value as Decoded;
 
 /// Which way an SDO frame goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,11 +190,18 @@ struct Object {
     subindex: u8,
 }
 
+impl Object {
+    /// Returns what is known of it.
+    fn known(self) -> Option<object::Object> {
+        object::Object::at(Multiplexor::new(self.index, self.subindex))
+    }
+}
+
 impl fmt::Display for Object {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{:04X}:{}", self.index, self.subindex)?;
-        if let Ok((object, sub)) = dictionary::find(self.index, self.subindex) {
-            return write!(out, " {}", object.dotted(sub));
+        if let Some(known) = self.known() {
+            return write!(out, " {}", known.name);
         }
         communication_name(self.index).map_or(Ok(()), |name| write!(out, " {name}"))
     }
@@ -217,15 +225,9 @@ impl fmt::Display for Value {
             _ => 4,
         };
         let bytes = self.data.get(..length).unwrap_or(&self.data);
-        let known = dictionary::find(self.object.index, self.object.subindex).ok();
-        if let Some((sub, raw)) =
-            known.and_then(|(_, sub)| Some((sub, sub.data_type.decode(bytes).ok()?)))
-        {
-            let scale = sub.scale;
-            let value = raw as f64 * f64::from(scale.numerator) / f64::from(scale.denominator);
-            let blank = if sub.unit.is_empty() { "" } else { " " };
-            let digits = decimals(scale.denominator);
-            return write!(out, " = {value:.digits$}{blank}{}", sub.unit);
+        if let Some(known) = self.object.known() {
+            let value = Decoded::of(&known, bytes);
+            return write!(out, " = {}", value.text(&known));
         }
         write!(out, " = 0x")?;
         bytes
@@ -269,15 +271,15 @@ mod tests {
         );
         assert_eq!(
             request([0x2B, 0x17, 0x10, 0, 0xC8, 0, 0, 0]),
-            "write 1017:0 Producer heartbeat time = 0x00C8"
+            "write 1017:0 heartbeat.producer = 0.200 s"
         );
         assert_eq!(
             response([0x60, 0x17, 0x10, 0, 0, 0, 0, 0]),
-            "written 1017:0 Producer heartbeat time"
+            "written 1017:0 heartbeat.producer"
         );
         assert_eq!(
             response([0x41, 0x08, 0x10, 0, 17, 0, 0, 0]),
-            "answer 1008:0 Manufacturer device name, 17 bytes in segments"
+            "answer 1008:0 device.name, 17 bytes in segments"
         );
         assert_eq!(response([0x0D, 0x61, 0, 0, 0, 0, 0, 0]), "last segment 61");
         assert_eq!(

@@ -1,6 +1,6 @@
 //! Clients from the Rust registry, which know nothing of this project: canopen-cli and zencan-cli.
 
-use eel_protocol::{NodeId, identity};
+use eel_protocol::{Frame, NodeId, identity};
 use eel_transport::{Bus, SocketBus};
 
 use crate::nodes::Nodes;
@@ -16,7 +16,7 @@ fn two_vertebrae(interface: &str) -> Nodes {
     let mut missing = vec![0x703, 0x705];
     while !missing.is_empty() {
         let received = bus.receive(PATIENCE).unwrap().expect("a boot-up message");
-        let id = received.frame().and_then(|frame| frame.cob_id());
+        let id = received.frame().and_then(Frame::cob_id);
         missing.retain(|wanted| Some(*wanted) != id);
     }
     nodes

@@ -3,7 +3,8 @@
 use core::fmt::{Result, Write};
 
 use super::Decimal;
-use super::communication::AREA;
+use super::communication::communication_name;
+use crate::communication::{self, Entry};
 use crate::dictionary::{OBJECTS, Pdo, Sub};
 use crate::emergency::CATALOGUE;
 use crate::messages::{MESSAGES, Sender};
@@ -107,22 +108,43 @@ fn write_pdos(out: &mut dyn Write) -> Result {
     Ok(())
 }
 
-fn write_dictionary(out: &mut dyn Write) -> Result {
+fn write_communication(out: &mut dyn Write) -> Result {
+    writeln!(out, "\n## Objects 0x1000-0x1FFF\n")?;
     writeln!(
         out,
-        "\n## Objects 0x1000-0x1FFF\n\n| object | name |\n|---|---|"
+        "| entry | name | type | access | step | unit | meaning |\n|---|---|---|---|---|---|---|"
     )?;
-    for area in AREA {
-        writeln!(out, "| {:04X} | {} |", area.index, area.name)?;
+    for (name, entry) in communication::entries() {
+        let Entry {
+            index, subindex, ..
+        } = entry;
+        let is_mapping = matches!(index & 0xFF00, 0x1600 | 0x1A00);
+        if is_mapping && subindex > 1 {
+            continue;
+        }
+        let access = if entry.is_writable { "rw" } else { "ro" };
+        write!(
+            out,
+            "| {index:04X}:{subindex} | `{name}` | {} | {access} | {} | {} | ",
+            entry.type_name(),
+            Decimal(entry.scale),
+            entry.unit
+        )?;
+        let title = communication_name(index).unwrap_or(entry.title);
+        write!(out, "{title}")?;
+        if title != entry.title {
+            write!(out, ": {}", entry.title)?;
+        }
+        if is_mapping && subindex == 1 {
+            write!(out, "; up to `.8`")?;
+        }
+        writeln!(out, " |")?;
     }
-    writeln!(
-        out,
-        "| 1400, 1401 / 1600, 1601 | RPDO communication / mapping |"
-    )?;
-    writeln!(
-        out,
-        "| 1800, 1801 / 1A00, 1A01 | TPDO communication / mapping |"
-    )?;
+    Ok(())
+}
+
+fn write_dictionary(out: &mut dyn Write) -> Result {
+    write_communication(out)?;
     for object in OBJECTS {
         writeln!(
             out,

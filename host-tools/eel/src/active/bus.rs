@@ -5,7 +5,8 @@ use clap::Args;
 use eel_client::Client;
 use eel_transport::{Bus, Interface, interfaces};
 
-use super::{NoBus, Usage};
+use super::NoBus;
+use crate::usage::Usage;
 
 /// The variable that names the bus.
 const VARIABLE: &str = "EEL_BUS";
@@ -17,7 +18,7 @@ pub type AnyBus = Box<dyn Bus + Send>;
 #[derive(Debug, Args)]
 pub struct BusOption {
     /// The bus, such as can0; without it what EEL_BUS names, else the only CAN interface that is up
-    #[arg(short, long, value_name = "BUS")]
+    #[arg(short, long, value_name = "BUS", global = true)]
     pub bus: Option<String>,
 }
 
@@ -107,11 +108,17 @@ fn choose(option: Option<&str>, variable: Option<&str>, all: &[Interface]) -> Re
                 .to_owned(),
         )
         .into()),
-        ([], [down, ..]) => Err(NoBus(format!(
-            "no CAN interface is up: `ip link set {down} up type can bitrate 1000000` as root (a \
-             vcan without type and bitrate)"
-        ))
-        .into()),
+        ([], [down, ..]) => {
+            let how = if down.starts_with("vcan") {
+                ""
+            } else {
+                " type can bitrate 1000000"
+            };
+            Err(NoBus(format!(
+                "no CAN interface is up: `ip link set {down} up{how}` as root"
+            ))
+            .into())
+        }
         (several, _) => Err(Usage(format!(
             "several CAN interfaces are up ({}): choose one with --bus or the variable {VARIABLE}",
             several.join(", ")

@@ -10,9 +10,9 @@ use eel_head::{Config, Gait, GaitError, Plane};
 use eel_protocol::{HEAD_NODE, NodeId};
 use serde_json::json;
 
-use super::Usage;
 use super::bus::{self, AnyBus, BusOption, Consent};
 use super::live::{Live, Outcome};
+use crate::usage::Usage;
 
 /// How long another head is listened for.
 const OTHER: Duration = Duration::from_millis(350);

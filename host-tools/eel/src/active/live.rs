@@ -1,6 +1,7 @@
 //! The head in real time on a bus.
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::time::{Duration, Instant};
 
@@ -19,10 +20,10 @@ use crate::source;
 const TICK: Duration = Duration::from_millis(1);
 /// Frames that are taken from the bus between two calls.
 const RECEIVED_PER_TICK: usize = 512;
-/// Frames that wait to be sent while the bus takes none: more than a second's worth.
+/// Frames that wait to be sent while the bus takes none: more than those of that time.
 const WAITING: usize = 2_048;
 /// How long the bus may take no frame before the head gives up.
-const STUCK: Duration = Duration::from_secs(1);
+const STUCK: Duration = Duration::from_millis(500);
 /// Time between two status lines.
 const SHOWN: Duration = Duration::from_millis(500);
 /// After which time without a vertebra this is told.
@@ -235,19 +236,58 @@ impl Live {
         is_due
     }
 
+    /// Tells what happened; what happened to several vertebrae at once is one line.
     fn events(&mut self, elapsed: Duration) -> Result<()> {
+        let mut lines: Vec<(String, Vec<u8>)> = Vec::new();
         while let Some(event) = self.head.poll_event() {
             let acknowledged = self.acknowledge(&event, elapsed);
             self.outcome.troubles += u64::from(is_trouble(&event) && !acknowledged);
-            self.status.clear();
-            let mut out = stdout().lock();
             if self.is_json {
-                writeln!(out, "{}", json_of(&event, elapsed))?;
-            } else {
-                let told = words(&event, acknowledged);
-                writeln!(out, "{:9.3}  {told}", elapsed.as_secs_f64())?;
+                writeln!(stdout(), "{}", json_of(&event, elapsed))?;
+                continue;
             }
-            out.flush()?;
+            let (node, text) = words(&event, acknowledged);
+            match lines.iter_mut().find(|(other, _)| *other == text) {
+                Some((_, nodes)) => nodes.extend(node.filter(|node| !nodes.contains(node))),
+                None => lines.push((text, node.into_iter().collect())),
+            }
+        }
+        if lines.is_empty() {
+            return Ok(());
+        }
+        self.status.clear();
+        let mut out = stdout().lock();
+        for (text, nodes) in lines {
+            let who = Who(&nodes).to_string();
+            writeln!(out, "{:9.3}  {who:<16}  {text}", elapsed.as_secs_f64())?;
+        }
+        Ok(out.flush()?)
+    }
+}
+
+/// Vertebrae as a list, `vertebrae 1-3, 7`; the head for none.
+struct Who<'a>(&'a [u8]);
+
+impl fmt::Display for Who<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            [] => return write!(out, "head"),
+            [one] => return write!(out, "vertebra {one}"),
+            _ => write!(out, "vertebrae")?,
+        }
+        let mut rest = self.0;
+        let mut lead = ' ';
+        while let [first, others @ ..] = rest {
+            let follows = (1..)
+                .zip(others)
+                .take_while(|(step, node)| **node == first + step);
+            let run = follows.count();
+            write!(out, "{lead}{first}")?;
+            if run > 0 {
+                write!(out, "-{}", first + run as u8)?;
+            }
+            lead = ',';
+            rest = others.get(run..).unwrap_or(&[]);
         }
         Ok(())
     }
@@ -308,50 +348,43 @@ fn is_trouble(event: &Event) -> bool {
     }
 }
 
-/// Returns an event in words.
-fn words(event: &Event, acknowledged: bool) -> String {
-    let vertebra = |node: &NodeId| format!("vertebra {:<2}", node.get());
-    match event {
-        Event::Booted(node) => format!("{}  on the bus", vertebra(node)),
-        Event::Running(node) => format!("{}  follows the gait", vertebra(node)),
-        Event::Lost(node) => format!(
-            "{}  fell silent: check its supply and cable",
-            vertebra(node)
+/// Returns whose event it is, and the event in words.
+fn words(event: &Event, acknowledged: bool) -> (Option<u8>, String) {
+    let (node, text) = match event {
+        Event::Booted(node) => (node, "on the bus".to_owned()),
+        Event::Running(node) => (node, "follows the gait".to_owned()),
+        Event::Lost(node) => (node, "fell silent: check its supply and cable".to_owned()),
+        Event::Latched(node, state) if acknowledged => (
+            node,
+            format!("was latched ({}), acknowledged", state.name()),
         ),
-        Event::Latched(node, state) if acknowledged => {
+        Event::Latched(node, state) => (
+            node,
             format!(
-                "{}  was latched ({}), acknowledged",
-                vertebra(node),
+                "latched ({}): find the cause, then start the head with --reset",
                 state.name()
-            )
-        }
-        Event::Latched(node, state) => format!(
-            "{}  latched ({}): find the cause, then start the head with --reset",
-            vertebra(node),
-            state.name()
-        ),
-        Event::Emergency(node, report) => match emergency::from_code(report.code) {
-            Some(known) if known.severity == Severity::Cleared => {
-                format!("{}  {}: {}", vertebra(node), known.name, known.sentence)
-            }
-            Some(known) => format!(
-                "{}  {} {}: {}",
-                vertebra(node),
-                known.severity.name(),
-                known.name,
-                known.sentence
             ),
-            None => format!("{}  emergency 0x{:04X}", vertebra(node), report.code),
-        },
-        Event::GaitStarted => "the gait begins".to_owned(),
-        Event::Stopped => "all drives are off".to_owned(),
-        Event::NotStopped(node) => {
-            format!(
-                "{}  was told to switch off and still drives",
-                vertebra(node)
-            )
+        ),
+        Event::Emergency(node, report) => {
+            let text = match emergency::from_code(report.code) {
+                Some(known) if known.severity == Severity::Cleared => {
+                    format!("{}: {}", known.name, known.sentence)
+                }
+                Some(known) => format!(
+                    "{} {}: {}",
+                    known.severity.name(),
+                    known.name,
+                    known.sentence
+                ),
+                None => format!("emergency 0x{:04X}", report.code),
+            };
+            (node, text)
         }
-    }
+        Event::GaitStarted => return (None, "the gait begins".to_owned()),
+        Event::Stopped => return (None, "all drives are off".to_owned()),
+        Event::NotStopped(node) => (node, "was told to switch off and still drives".to_owned()),
+    };
+    (Some(node.get()), text)
 }
 
 fn json_of(event: &Event, elapsed: Duration) -> serde_json::Value {
@@ -382,4 +415,18 @@ fn json_of(event: &Event, elapsed: Duration) -> serde_json::Value {
         all["node"] = json!(node.get());
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertebrae_are_listed_in_runs() {
+        let who = |nodes: &[u8]| Who(nodes).to_string();
+        assert_eq!(who(&[]), "head");
+        assert_eq!(who(&[3]), "vertebra 3");
+        assert_eq!(who(&[1, 2, 3, 7, 9, 10]), "vertebrae 1-3,7,9-10");
+        assert_eq!(who(&[2, 1]), "vertebrae 2,1");
+    }
 }

@@ -10,8 +10,9 @@ use eel_client::{Client, ClientError, LssAddress, LssFailure, NmtState};
 use eel_protocol::identity;
 use serde_json::json;
 
+use super::Node;
 use super::bus::{AnyBus, BusOption};
-use super::{Node, Usage};
+use crate::usage::Usage;
 
 /// How long a node that got its id may take to boot.
 const BOOT: Duration = Duration::from_secs(2);

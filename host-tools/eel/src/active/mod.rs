@@ -6,10 +6,8 @@ mod live;
 mod lss;
 mod nmt;
 mod nodes;
-mod object;
 mod read;
 mod store;
-mod value;
 mod write;
 
 use std::fmt;
@@ -17,6 +15,8 @@ use std::str::FromStr;
 
 use eel_client::ClientError;
 use eel_protocol::{HEAD_NODE, VERTEBRAE};
+
+use crate::usage::Usage;
 
 pub use head::Head;
 pub use lss::Lss;
@@ -26,10 +26,6 @@ pub use read::Read;
 pub use store::Store;
 pub use write::Write;
 
-/// A wrong use of a command: exit code 2.
-#[derive(Debug)]
-pub struct Usage(pub String);
-
 /// No bus to work on: exit code 3.
 #[derive(Debug)]
 pub struct NoBus(pub String);
@@ -37,14 +33,6 @@ pub struct NoBus(pub String);
 /// A node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node(pub u8);
-
-impl fmt::Display for Usage {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Usage {}
 
 impl fmt::Display for NoBus {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -7,11 +7,12 @@ use clap::Args;
 use eel_client::Method;
 use serde_json::json;
 
+use super::Node;
 use super::bus::{BusOption, Consent};
-use super::object::{self, Object};
 use super::read::Bar;
-use super::value::{Value, parse};
-use super::{Node, Usage};
+use crate::object::{self, Object};
+use crate::usage::Usage;
+use crate::value::{Value, parse};
 
 const AFTER: &str = "\
 Names are those of `eel export md`. A number is given in the object's unit, with --raw in raw steps;

@@ -30,7 +30,8 @@ pub fn compress(text: &[u8]) -> Result<Vec<u8>> {
         symbols,
     } = find(text)?;
     let highest = characters.len() + rules.len() - 1;
-    let width = usize::BITS - highest.leading_zeros();
+    // A text of one character has codes too.
+    let width = (usize::BITS - highest.leading_zeros()).max(1);
     ensure!(width <= 16, "{} rules are too many", rules.len());
     let mut bytes = Vec::new();
     bytes.extend(u32::try_from(text.len())?.to_le_bytes());

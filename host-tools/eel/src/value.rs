@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use eel_protocol::{LimitCode, Mode, State, Status, dictionary, emergency};
 use serde_json::json;
 
-use super::Usage;
-use super::object::{Kind, Object};
 use crate::decode::decimals;
+use crate::object::{Kind, Object};
+use crate::usage::Usage;
 
 /// Bytes that are shown of a domain.
 const SHOWN: usize = 32;
@@ -56,7 +56,8 @@ impl Value {
     pub fn text(&self, object: &Object) -> String {
         match self {
             Self::Number(raw) => number(object, *raw),
-            Self::Text(text) => text.clone(),
+            // A terminal must not obey what a node says.
+            Self::Text(text) => text.replace(char::is_control, "\u{FFFD}"),
             Self::Bytes(bytes) => {
                 let shown = bytes.iter().take(SHOWN);
                 let mut text = format!("{} bytes", bytes.len());
@@ -272,8 +273,8 @@ fn hexadecimal(digits: &str) -> Result<Vec<u8>, Usage> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::object::find;
     use super::*;
+    use crate::object::find;
 
     fn one(name: &str) -> Object {
         find(name).unwrap().remove(0)
@@ -292,6 +293,7 @@ mod tests {
             shown("device.name", b"Anguilla vertebra\0"),
             "Anguilla vertebra"
         );
+        assert_eq!(shown("device.name", b"a\x1b[2J"), "a\u{FFFD}[2J");
         assert_eq!(shown("identity.serial", &[4, 3, 2, 1]), "0x01020304");
         assert_eq!(shown("pose.code", &[0x53]), "83  run, counter 5");
         assert_eq!(shown("pose.status", &[0, 0]), "0  nothing in the way");

@@ -4,7 +4,7 @@ use eel_client::{Access, Multiplexor};
 use eel_protocol::communication;
 use eel_protocol::dictionary::{self, Scale, Sub};
 
-use super::Usage;
+use crate::usage::Usage;
 
 /// An object that can be read or written, with what is known of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,6 +107,16 @@ impl Object {
             range: kind.range(),
             is_writable: entry.is_writable,
         }
+    }
+
+    /// Returns what is known of the object at a place; `None` where nothing is.
+    pub fn at(place: Multiplexor) -> Option<Self> {
+        let Multiplexor { index, subindex } = place;
+        if let Ok((object, sub)) = dictionary::find(index, subindex) {
+            return Some(Self::of_sub(object, sub));
+        }
+        let (name, entry) = communication::find(index, subindex)?;
+        Some(Self::of_entry(name, entry))
     }
 
     /// Makes an object that only its number is known of.
