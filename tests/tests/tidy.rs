@@ -327,7 +327,10 @@ fn the_conformance_list_names_tests_and_peers_that_exist() {
             named += 1;
         }
         for script in quoted(peers) {
-            assert!(root.join("tests/python").join(script).is_file(), "no {script}");
+            assert!(
+                root.join("tests/python").join(script).is_file(),
+                "no {script}"
+            );
         }
     }
     assert!(named > 40, "{named} tests are named");
