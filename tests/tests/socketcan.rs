@@ -25,6 +25,9 @@ mod peers;
 #[path = "socketcan/python_canopen.rs"]
 mod python_canopen;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/slave.rs"]
+mod slave;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/support.rs"]
 mod support;
 #[cfg(target_os = "linux")]

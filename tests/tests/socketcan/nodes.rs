@@ -16,12 +16,23 @@ pub struct Nodes {
 }
 
 impl Nodes {
+    /// Powers some up that have their ids.
     pub fn start(interface: &str, chosen: Vec<NodeId>) -> Self {
+        Self::power(interface, chosen, Vec::new())
+    }
+
+    /// Powers some up that have no ids yet.
+    pub fn unconfigured(interface: &str, places: Vec<NodeId>) -> Self {
+        Self::power(interface, Vec::new(), places)
+    }
+
+    fn power(interface: &str, chosen: Vec<NodeId>, unconfigured: Vec<NodeId>) -> Self {
         let bus = SocketBus::open(interface).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&stop);
         let thread = thread::spawn(move || {
-            let mut nodes = Realtime::with_nodes(bus, &Config::default(), 1, &chosen);
+            let plant = Config::default();
+            let mut nodes = Realtime::with_unconfigured(bus, &plant, 1, &chosen, &unconfigured);
             nodes.run(|_| !told.load(Ordering::Relaxed)).unwrap()
         });
         Self {

@@ -84,7 +84,7 @@ fn zencan_cli_scans_reads_writes_and_starts_vertebrae() {
     say("write 3 0x2020 1 u32 123456");
     assert_eq!(say("read 3 0x2020 1 u32"), "Value: 123456");
     let refusal = say("write 3 0x2020 1 u32 600000");
-    assert!(refusal.contains("06090031"), "{refusal}");
+    assert!(refusal.contains("ValueTooHigh"), "{refusal}");
     say("nmt start 3");
     let found = say("scan");
     assert!(found.contains("Node 3: Operational"), "{found}");
@@ -97,5 +97,38 @@ fn zencan_cli_scans_reads_writes_and_starts_vertebrae() {
         let entry = format!("index=0x{index:04X}");
         assert_eq!(pdos.matches(&entry).count(), count, "{pdos}");
     }
+    assert_eq!(nodes.end().dropped, 0);
+}
+
+#[test]
+fn zencan_cli_finds_vertebrae_without_ids_and_gives_them_some() {
+    let Some(name) = interface() else { return };
+    let places = [3, 5].map(|id| NodeId::new(id).unwrap());
+    let nodes = Nodes::unconfigured(&name, places.to_vec());
+    let zencan = peer("zencan-cli");
+    let say = |command: &str| run(&[&zencan, "--command", command, &name]);
+    // 100 ms for an answer.
+    let found = say("lss fastscan 100");
+    assert!(found.starts_with("Found 2 unconfigured nodes"), "{found}");
+    for id in [3, 5] {
+        let (vendor, product) = (identity::VENDOR, identity::PRODUCT);
+        let (revision, serial) = (identity::REVISION, 0x5EE1_0000 + id);
+        let address = format!("{vendor:#x} {product:#x} {revision:#x} {serial:#x}");
+        assert!(found.contains(&address), "{found}");
+        let given = say(&format!("lss set-node-id {id} {address}"));
+        assert_eq!(given.trim(), "Success!");
+        let stored = say(&format!("lss store-config {address}"));
+        assert!(stored.ends_with("Success!\n"), "{stored}");
+    }
+    say("lss global 0");
+    let found = say("scan");
+    for id in [3, 5] {
+        let node = format!("Node {id}: PreOperational");
+        let serial = format!("serial: {:X}", 0x5EE1_0000 + id);
+        assert!(found.contains(&node) && found.contains(&serial), "{found}");
+    }
+    // It writes the signature "save" the wrong way round (CiA 301, 7.5.2.13), so nothing is stored.
+    let refusal = say("save-objects 3");
+    assert!(refusal.contains("CantStore"), "{refusal}");
     assert_eq!(nodes.end().dropped, 0);
 }

@@ -1,24 +1,39 @@
 //! Every service of a vertebra as python-canopen uses it, which knows nothing of this project.
 //!
-//! The scripts in tests/python say what they found; what it must be is here, after CiA 301.
+//! The scripts in tests/python say what they found; what it must be is here, after CiA 301 and 305.
 
 use std::fs;
 use std::path::Path;
 
-use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId};
+use eel_protocol::{HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, identity};
 use serde_json::{Value, json};
 
+use crate::dissect::dissect;
 use crate::nodes::Nodes;
-use crate::support::{interface, python, root, script};
+use crate::support::{Recording, frames_of, interface, python, root, script};
 
 /// Runs a script beside some vertebrae and returns what it found.
 fn meet(nodes: &[u8], name: &str) -> Option<Value> {
     let interface = interface()?;
-    let nodes = nodes.iter().map(|id| NodeId::new(*id).unwrap()).collect();
-    let vertebrae = Nodes::start(&interface, nodes);
+    let vertebrae = Nodes::start(&interface, ids(nodes));
     let found = script(name, &[&interface]);
     assert_eq!(vertebrae.end().dropped, 0);
     Some(found)
+}
+
+fn ids(numbers: &[u8]) -> Vec<NodeId> {
+    let valid = numbers.iter().map(|id| NodeId::new(*id).unwrap());
+    valid.collect()
+}
+
+/// Runs a script that has every frame dissected as what it is, too.
+fn meet_dissected(vertebrae: Nodes, interface: &str, name: &str) -> Value {
+    let recording = Recording::start(interface, name);
+    let found = script(name, &[interface]);
+    assert_eq!(vertebrae.end().dropped, 0);
+    let (file, log) = recording.end();
+    dissect(&file, &frames_of(&log));
+    found
 }
 
 /// Tells whether a count is what it must be, give or take one at the edge.
@@ -156,6 +171,160 @@ fn check_pdo_refusals(found: &Value) {
             "carried": true,
         })
     );
+}
+
+#[test]
+fn values_of_every_length_move_in_every_way_of_sdo() {
+    let Some(name) = interface() else { return };
+    let found = meet_dissected(Nodes::start(&name, ids(&[3])), &name, "sdo.py");
+    assert_eq!(
+        found["short values"],
+        json!({
+            "1001": 0,
+            "1017": 200,
+            "1000": 0x0003_0000,
+            "written": ["2c01", "40e20100", "d204", "64"],
+            "text": "Anguilla vertebra",
+        })
+    );
+    let transfers = found["transfers"].as_object().unwrap();
+    assert_eq!(transfers.len(), 4 * 5, "four ways, five lengths");
+    for (transfer, arrived) in transfers {
+        assert_eq!(arrived, &json!([true, true]), "{transfer}: down, up");
+    }
+    assert_eq!(
+        found["refusals"],
+        json!({
+            "no object": "06020000",
+            "no subindex": "06090011",
+            "write to what is read only": "06010002",
+            "write to a constant": "06010002",
+            "too long": "06070012",
+            "too short": "06070013",
+            "too high": "06090031",
+            "too low": "06090032",
+            "not a counter": "06090030",
+        })
+    );
+    assert_eq!(
+        found["broken protocol"],
+        json!({
+            "unknown command": "05040001",
+            "segment of nothing": "05040001",
+            "toggle": ["41", "00", "05030000"],
+            "block of 0": "05040002",
+            "block of 128": "05040002",
+            "block refused": ["C6", "05040001"],
+            "crc": ["A4", "A2", "05040004"],
+            "silence": ["41", "05040000"],
+            "afterwards": "Anguilla vertebra",
+        })
+    );
+}
+
+#[test]
+fn parameters_are_stored_and_restored() {
+    let Some(found) = meet(&[3], "store.py") else {
+        return;
+    };
+    assert_eq!(
+        found,
+        json!({
+            "offers": [3, 1, 1, 1],
+            "default": [200, 2, 400_000],
+            "not stored": [200, 2, 400_000],
+            "wrong signatures": ["08000020", "08000020", "06070013", "06090011"],
+            "stored": [250, 7, 123_456],
+            "until reset": [250, 7, 123_456],
+            "application restored": [250, 7, 400_000],
+            "restored": [200, 2, 400_000],
+        })
+    );
+}
+
+#[test]
+fn a_tool_can_learn_everything_from_the_vertebra_itself() {
+    let Some(found) = meet(&[3], "data_sheet.py") else {
+        return;
+    };
+    let pose = ["yaw", "pitch", "roll", "code", "crc"].map(|name| format!("pose.{name}"));
+    assert_eq!(
+        found,
+        json!({
+            "objects": true,
+            "same": true,
+            "format": 0,
+            "name": "Anguilla vertebra",
+            "stiffness": 99_500,
+            "pose": pose,
+        })
+    );
+}
+
+#[test]
+fn two_vertebrae_without_ids_are_found_and_named() {
+    let Some(name) = interface() else { return };
+    let vertebrae = Nodes::unconfigured(&name, ids(&[3, 5]));
+    let found = meet_dissected(vertebrae, &name, "lss.py");
+    let one = |serial: u32| {
+        let address = [
+            identity::VENDOR,
+            identity::PRODUCT,
+            identity::REVISION,
+            serial,
+        ];
+        // The id of before is in use until the node boots anew: none, 255.
+        json!([address, address, 255, 255])
+    };
+    let serials = [0x5EE1_0003_u32, 0x5EE1_0005];
+    assert_eq!(
+        found,
+        json!({
+            "scanned": serials.map(one),
+            "booted": [0, 0],
+            "serials": serials,
+            "refusals": {
+                "selected": true,
+                "id 0": "LSS Error: 1",
+                "id 128": "LSS Error: 1",
+                "125 kbit/s": "LSS Error: 1",
+                "1 Mbit/s": "accepted",
+            },
+            "after reset": serials,
+        })
+    );
+}
+
+#[test]
+fn a_running_vertebra_lets_go_when_the_head_falls_silent_and_knows_when() {
+    // A host that stands still for 90 ms loses targets too, and gets another try.
+    let lost_targets = |found: &Value| found["emergencies"].to_string().contains("\"5082");
+    let mut tries = (0..3).map_while(|_| meet(&[3], "safe.py"));
+    let Some(found) = tries.next() else { return };
+    let found = std::iter::once(found)
+        .chain(tries)
+        .find(|found| !lost_targets(found))
+        .expect("a host that does not stand still");
+    let (off, ready, run, stop_damped, stop_brake) = (1, 2, 3, 7, 8);
+    assert_eq!(found["running"], json!([off, ready, run]));
+    assert_eq!(
+        found["emergencies"],
+        json!(["30817f0000"]),
+        "8130, the node is 127"
+    );
+    assert_eq!(found["let go"], json!([run, stop_damped, stop_brake]));
+    assert_eq!(found["again"], json!([stop_brake, off, ready, run]));
+    let freeze = &found["freeze"];
+    assert_eq!(freeze["bytes"], 128);
+    assert_eq!(
+        (&freeze["code"], &freeze["detail"]),
+        (&json!(0x8130), &json!(127))
+    );
+    // TIME was told, and runs on until the stop.
+    let (clock, told) = (&freeze["clock"], &found["told"]);
+    assert_eq!((&clock[0], &clock[1]), (&json!(1), &told[0]));
+    let later_ms = clock[2].as_i64().unwrap() - told[1].as_i64().unwrap();
+    assert!((1..60_000).contains(&later_ms), "{freeze} {told}");
 }
 
 /// Lets a vertebra nod and returns how high it was told to and did, in degrees; a host that stood
