@@ -24,23 +24,23 @@ pub(crate) struct Communication {
 
 impl Communication {
     pub fn new(config: &Config, now_us: u64) -> Self {
-        let node_id = config.node_id;
-        let rpdo = |place| Rpdo::new(config.rpdos.get(place), node_id);
-        let tpdo = |place| Tpdo::new(config.tpdos.get(place), node_id);
-        Self {
-            producer: Producer::new(config.heartbeat_ms, now_us),
-            consumer: Consumer::new(config.consumer),
-            sync: Sync::new(config.sync_cob_id, config.sync_counter_overflow),
-            time: Time::new(config.time_cob_id),
-            error_behaviour: config.error_behaviour,
-            rpdos: core::array::from_fn(rpdo),
-            tpdos: core::array::from_fn(tpdo),
+        let mut communication = Self {
+            producer: Producer::new(0, 0),
+            consumer: Consumer::new(None),
+            sync: Sync::new(0, 0),
+            time: Time::new(0),
+            error_behaviour: 0,
+            rpdos: [Rpdo::absent(); PDOS],
+            tpdos: [Tpdo::absent(); PDOS],
             emergency: Emergency::new(config),
-        }
+        };
+        communication.reset(NmtCommand::ResetNode, config, now_us);
+        communication
     }
 
     /// Returns every parameter to its default. When only the communication is reset, the
     /// application's errors and the history stay.
+    #[inline(never)] // One copy in flash.
     pub fn reset(&mut self, command: NmtCommand, config: &Config, now_us: u64) {
         // In place, part by part: a whole new one would be copied twice.
         let node_id = config.node_id;
@@ -50,10 +50,10 @@ impl Communication {
         self.time = Time::new(config.time_cob_id);
         self.error_behaviour = config.error_behaviour;
         for (place, rpdo) in self.rpdos.iter_mut().enumerate() {
-            *rpdo = Rpdo::new(config.rpdos.get(place), node_id);
+            rpdo.reset(config.rpdos.get(place), node_id);
         }
         for (place, tpdo) in self.tpdos.iter_mut().enumerate() {
-            *tpdo = Tpdo::new(config.tpdos.get(place), node_id);
+            tpdo.reset(config.tpdos.get(place), node_id);
         }
         self.emergency.reset(command, config);
     }

@@ -180,6 +180,12 @@ impl Emergency {
         }
     }
 
+    /// Tells whether a message waits.
+    #[inline]
+    pub fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
     /// Returns when the next message may be sent, if one waits.
     pub fn deadline_us(&self) -> Option<u64> {
         (!self.waiting.is_empty()).then_some(self.quiet_until_us)

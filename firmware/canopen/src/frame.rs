@@ -31,6 +31,20 @@ impl<const N: usize> Frame<N> {
         Self::new(StandardId::new(cob_id & 0x7FF)?, data)
     }
 
+    /// Makes a data frame of the first `length` bytes; the others must be 0. It is [`standard`](Self::standard)
+    /// without a copy of unknown length, which costs more than all the rest.
+    pub(crate) fn from_bytes(cob_id: u16, data: [u8; N], length: u8) -> Option<Self> {
+        if usize::from(length) > N {
+            return None;
+        }
+        Some(Self {
+            id: Id::Standard(StandardId::new(cob_id & 0x7FF)?),
+            remote: false,
+            length,
+            data,
+        })
+    }
+
     /// Makes a remote frame that asks for `length` bytes; `None` above `N`.
     pub fn remote(id: impl Into<Id>, length: u8) -> Option<Self> {
         if usize::from(length) > N {

@@ -75,6 +75,15 @@ enum Waiting {
     Lss,
 }
 
+/// What process data a frame is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ProcessData {
+    None,
+    Sync,
+    /// An RPDO, if it is one of this node's.
+    Other,
+}
+
 impl Node {
     /// Makes a node that is Pre-operational and whose boot-up message waits to be sent.
     ///
@@ -82,7 +91,8 @@ impl Node {
     /// this node can't have are left out, all of them: see [`has_refused_stored`](Self::has_refused_stored).
     /// With a node id outside 1–127 the node is unconfigured: it stays `Initialising` and only
     /// listens to LSS.
-    pub fn new(config: Config, stored: &[u8], app: &impl Application, now_us: u64) -> Self {
+    #[inline(never)] // One copy in flash, and a small one.
+    pub fn new(config: Config, stored: &[u8], app: &dyn Application, now_us: u64) -> Self {
         let mut node = Self {
             config,
             state: NmtState::Initialising,
@@ -103,7 +113,8 @@ impl Node {
         node.load(now_us);
         if node.stored.len() != stored.len() || !stored::is_served(&node.communication, app) {
             node.stored.clear();
-            node.communication = Communication::new(&node.config, now_us);
+            node.communication
+                .reset(NmtCommand::ResetNode, &node.config, now_us);
         }
         node.stored_refused = node.stored.len() != stored.len();
         node.boot();
@@ -120,32 +131,14 @@ impl Node {
             return;
         }
         let data = frame.data();
-        if cob_id == lss::REQUEST {
-            self.set_layer(now_us, data, app);
+        match self.manage(now_us, cob_id, data, app) {
+            ProcessData::None => {}
+            ProcessData::Sync => self.synchronise(data, app),
+            ProcessData::Other => self.receive(cob_id, data, app),
         }
-        if self.state == NmtState::Initialising {
-            return;
+        if self.sdo.has_begun() || self.communication.emergency.is_waiting() {
+            self.settle(now_us, app);
         }
-        self.expire(now_us);
-        if cob_id == 0 {
-            self.command(now_us, data);
-        } else if self.communication.consumer.node().map(heartbeat_cob_id) == Some(cob_id) {
-            self.hear(now_us, data);
-        } else if self.state != NmtState::Stopped {
-            if cob_id == self.communication.sync.cob_id() {
-                self.synchronise(now_us, data, app);
-            } else if cob_id == 0x600 + u16::from(self.config.node_id) {
-                self.serve(now_us, data, app);
-            } else if self.communication.time.cob_id() == Some(cob_id) {
-                if let Some((days, ms)) = time::of_day(data) {
-                    self.events.push(Event::Time { days, ms });
-                }
-            } else if self.state == NmtState::Operational {
-                self.receive(cob_id, data, app);
-            }
-        }
-        self.sdo.settle(app);
-        self.send_emergencies(now_us);
     }
 
     /// Does what the time demands: heartbeats, time-outs, event-driven TPDOs, and at most four
@@ -155,25 +148,22 @@ impl Node {
             return;
         }
         self.expire(now_us);
-        if self.communication.producer.is_due(now_us) {
-            self.transmit
-                .replace(heartbeat_cob_id(self.config.node_id), &[self.state as u8]);
-        }
+        self.beat(now_us);
         if self.state == NmtState::Operational {
             for place in 0..self.communication.tpdos.len() {
                 let tpdo = self.communication.tpdos.get_mut(place);
                 if tpdo.is_some_and(|tpdo| tpdo.is_due_at(now_us)) {
-                    self.send_tpdo(place, now_us, app);
+                    self.send_tpdo(place, app);
                 }
             }
         }
-        self.send_emergencies(now_us);
         self.stream(now_us, app);
-        self.sdo.settle(app);
+        self.settle(now_us, app);
     }
 
     /// Returns the time at which [`tick`](Self::tick) has something to do; `None` when only a
     /// frame can give the node work. It is past while segments of an SDO block upload find room.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn next_deadline_us(&self) -> Option<u64> {
         if self.state == NmtState::Initialising {
             return None;
@@ -201,11 +191,13 @@ impl Node {
     /// At most 16 wait. One that finds the queue full is dropped and counted
     /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced. Eight
     /// more of the SDO server wait until there is no other.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn poll_transmit(&mut self) -> Option<Frame> {
         self.transmit.pop(sdo_cob_id(self.config.node_id))
     }
 
     /// Takes the next event. At most 16 wait; the oldest are displaced and counted.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.events.pop()
     }
@@ -240,6 +232,7 @@ impl Node {
     /// Tells the bus of an error of the application: sets `register_bits` in the error register
     /// (0x1001), remembers the error (0x1003) and sends the emergency, at once or as soon as the
     /// inhibit time (0x1015) and the state allow. At most eight wait; more are counted only.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn emergency(&mut self, now_us: u64, code: u16, register_bits: u8, detail: [u8; 5]) {
         self.communication
             .emergency
@@ -249,6 +242,7 @@ impl Node {
 
     /// Tells the bus that an error of the application is gone: clears `register_bits` in the error
     /// register and sends an emergency with code 0 and what is left of the register.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn emergency_cleared(&mut self, now_us: u64, register_bits: u8) {
         self.communication.emergency.clear(register_bits);
         self.send_emergencies(now_us);
@@ -266,11 +260,66 @@ impl Node {
         }
     }
 
+    /// Does with a frame all but process data, and tells what process data it is.
+    #[inline(never)] // One copy in flash.
+    fn manage(
+        &mut self,
+        now_us: u64,
+        cob_id: u16,
+        data: &[u8],
+        app: &mut dyn Application,
+    ) -> ProcessData {
+        if cob_id == lss::REQUEST {
+            self.set_layer(now_us, data, app);
+        }
+        if self.state == NmtState::Initialising {
+            return ProcessData::None;
+        }
+        self.expire(now_us);
+        if cob_id == 0 {
+            self.command(now_us, data);
+        } else if self.communication.consumer.node().map(heartbeat_cob_id) == Some(cob_id) {
+            self.hear(now_us, data);
+        } else if self.state != NmtState::Stopped {
+            if cob_id == self.communication.sync.cob_id() {
+                return ProcessData::Sync;
+            } else if cob_id == 0x600 + u16::from(self.config.node_id) {
+                self.serve(now_us, data, app);
+            } else if self.communication.time.cob_id() == Some(cob_id) {
+                if let Some((days, ms)) = time::of_day(data) {
+                    self.events.push(Event::Time { days, ms });
+                }
+            } else if self.state == NmtState::Operational {
+                return ProcessData::Other;
+            }
+        }
+        ProcessData::None
+    }
+
+    /// Ends a frame or a tick: what was broken off, and what has to be told.
+    #[inline(never)] // One copy in flash.
+    fn settle(&mut self, now_us: u64, app: &mut dyn Application) {
+        if self.state != NmtState::Initialising {
+            self.sdo.settle(app);
+            self.send_emergencies(now_us);
+        }
+    }
+
+    /// Sends a heartbeat if one is due.
+    #[inline(never)] // One copy in flash, and a small one.
+    fn beat(&mut self, now_us: u64) {
+        if self.communication.producer.is_due(now_us) {
+            let data = [self.state as u8, 0, 0, 0, 0, 0, 0, 0];
+            self.transmit
+                .replace(heartbeat_cob_id(self.config.node_id), data, 1);
+        }
+    }
+
     fn boot(&mut self) {
         if matches!(self.config.node_id, 1..=127) {
             self.state = NmtState::PreOperational;
             self.transmit
-                .push(heartbeat_cob_id(self.config.node_id), &[0]);
+                .push(heartbeat_cob_id(self.config.node_id), [0; 8], 1);
         }
     }
 
@@ -341,7 +390,7 @@ impl Node {
     }
 
     #[inline(never)] // One copy in flash.
-    fn serve(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
+    fn serve(&mut self, now_us: u64, data: &[u8], app: &mut dyn Application) {
         let Ok(request) = data.try_into() else { return };
         let Self {
             config,
@@ -382,7 +431,8 @@ impl Node {
     }
 
     /// Makes segments of an SDO block upload while there is room for them.
-    fn stream(&mut self, now_us: u64, app: &mut impl Application) {
+    #[inline(never)] // One copy in flash, and a small one.
+    fn stream(&mut self, now_us: u64, app: &mut dyn Application) {
         let Self {
             config,
             communication,
@@ -411,7 +461,7 @@ impl Node {
         }
         while let Some(message) = self.communication.emergency.next(now_us) {
             self.transmit
-                .push(self.communication.emergency.cob_id(), &message);
+                .push(self.communication.emergency.cob_id(), message, 8);
         }
     }
 }

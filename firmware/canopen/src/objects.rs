@@ -11,10 +11,10 @@ const RPDO_PARAMETERS: u8 = 2;
 const TPDO_PARAMETERS: u8 = 6;
 
 /// Both halves of the dictionary at one time.
-pub(crate) struct Objects<'a, A> {
+pub(crate) struct Objects<'a> {
     pub config: &'a Config,
     pub communication: &'a mut Communication,
-    pub app: &'a mut A,
+    pub app: &'a mut dyn Application,
     pub now_us: u64,
     /// What a write asked to be stored; while it is not done, nothing else can be asked for.
     pub storing: &'a mut Option<StoreRequest>,
@@ -44,7 +44,7 @@ enum PdoObject {
     TpdoMapping(usize),
 }
 
-impl<A: Application> Objects<'_, A> {
+impl Objects<'_> {
     /// Describes an object.
     ///
     /// # Errors

@@ -97,11 +97,10 @@ impl Reader<'_> {
     fn take_pdo(&mut self, parameters: &mut Parameters, predefined: u16) -> Option<()> {
         let (cob_id, enabled) = self.take_identifier(predefined)?;
         let [transmission, count] = self.take()?;
-        let mut mapping = [Mapped::default(); MAPPED_OBJECTS];
-        for mapped in &mut mapping {
+        for mapped in parameters.entries_mut() {
             *mapped = Mapped::from_raw(self.take_u32()?);
         }
-        parameters.restore(cob_id, enabled, transmission, count, mapping)
+        parameters.restore(cob_id, enabled, transmission, count)
     }
 }
 
@@ -188,7 +187,7 @@ pub(crate) fn load(
 }
 
 /// Tells whether every mapped object exists and may go where it is mapped to.
-pub(crate) fn is_served(communication: &Communication, app: &impl Application) -> bool {
+pub(crate) fn is_served(communication: &Communication, app: &dyn Application) -> bool {
     let rpdos = communication.rpdos.iter().map(|rpdo| &rpdo.parameters);
     let tpdos = communication.tpdos.iter().map(|tpdo| &tpdo.parameters);
     rpdos.chain(tpdos).all(|parameters| {
@@ -201,7 +200,7 @@ pub(crate) fn is_served(communication: &Communication, app: &impl Application) -
 }
 
 /// Describes an object as far as PDOs are concerned.
-fn describe(mapped: Mapped, app: &impl Application) -> Result<Entry, Abort> {
+fn describe(mapped: Mapped, app: &dyn Application) -> Result<Entry, Abort> {
     match (mapped.index, mapped.subindex) {
         (0x1001, 0) => Ok(Entry {
             length: 1,

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Bench, CONFIG, ID};
-use eel_canopen::{Event, Frame, NmtState, Node};
+use eel_canopen::{Abort, Event, Frame, NmtState, Node};
 
 /// Frames in one run; `CANOPEN_FRAMES` asks for more.
 const FRAMES: u32 = 200_000;
@@ -78,7 +78,31 @@ const SEEDS: &[(u16, &[u8])] = &[
     (0x605, &[0x82, 8, 9, 0, 0, 0, 0, 0]),
     (0x605, &[0xD5, 0, 0, 0, 0, 0, 0, 0]),
     (0x605, &[0x80, 0x20, 0x20, 0, 0, 0, 4, 5]),
+    (0x605, &[0xC6, 0x23, 0x20, 0, 9, 0, 0, 0]),
+    (0x605, &[0xC2, 0x23, 0x20, 0, 0, 4, 0, 0]),
+    (0x605, &[0x21, 0x23, 0x20, 0, 14, 0, 0, 0]),
+    (0x605, &[0xA4, 0x23, 0x20, 0, 127, 0, 0, 0]),
+    (0x605, &[0xA2, 127, 127, 0, 0, 0, 0, 0]),
+    (0x605, &[0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']),
+    (0x605, &[0x23, 0x10, 0x10, 2, b's', b'a', b'v', b'e']),
+    (0x605, &[0x23, 0x11, 0x10, 1, b'l', b'o', b'a', b'd']),
+    (0x605, &[0x23, 0x12, 0x10, 0, 0, 1, 0, 0x80]),
+    (0x605, &[0x2F, 0x29, 0x10, 1, 2, 0, 0, 0]),
+    (0x100, &[1, 2, 3, 4, 5, 6]),
     (0x7E5, &[0x04, 1, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x04, 0, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x40, 0x78, 0x56, 0x34, 0x12, 0, 0, 0]),
+    (0x7E5, &[0x41, 0xE1, 0x0E, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x42, 2, 0, 1, 0, 0, 0, 0]),
+    (0x7E5, &[0x43, 0x0D, 0xF0, 0xFE, 0xCA, 0, 0, 0]),
+    (0x7E5, &[0x11, 9, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x11, 0xFF, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x13, 0, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x17, 0, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x5D, 0, 0, 0, 0, 0, 0, 0]),
+    (0x7E5, &[0x51, 0, 0, 0, 0, 0x80, 0, 0]),
+    (0x7E5, &[0x51, 0, 0, 0, 0, 31, 0, 0]),
+    (0x7E5, &[0x51, 0x78, 0x56, 0x34, 0x12, 0, 0, 1]),
 ];
 
 fn random_frame(random: &mut Random) -> Frame {
@@ -130,6 +154,10 @@ fn disturb(bench: &mut Bench, random: &mut Random) -> usize {
             .emergency_cleared(bench.now_us, random.next() as u8),
         2 => bench.node.request_tpdo(random.next() as u8),
         3 => bench.app.refuse = !bench.app.refuse,
+        4..=6 => {
+            let outcome = random.pick(&[Ok(()), Ok(()), Err(Abort::Hardware)]);
+            bench.node.finish_store(bench.now_us, outcome);
+        }
         _ => {}
     }
     bench.app.calls.clear();
@@ -140,11 +168,35 @@ fn disturb(bench: &mut Bench, random: &mut Random) -> usize {
     }
 }
 
+/// Gives the node its id and its defaults back, whatever LSS and SDO have made of them.
+fn restore(bench: &mut Bench) {
+    let lss = |bench: &mut Bench, command: u8, value: u8| {
+        bench.hear(0x7E5, &[command, value, 0, 0, 0, 0, 0, 0]);
+        bench.node.finish_store(bench.now_us, Ok(()));
+    };
+    bench.node.finish_store(bench.now_us, Ok(()));
+    for (command, value) in [(0x04, 1), (0x11, ID), (0x17, 0), (0x04, 0)] {
+        lss(bench, command, value);
+    }
+    bench.hear(0, &[130, 0]);
+    assert_eq!(bench.node.node_id(), ID);
+    bench.sent();
+    let load = [0x23, 0x11, 0x10, 1, b'l', b'o', b'a', b'd'];
+    bench.hear(0x605, &load);
+    bench.node.finish_store(bench.now_us, Ok(()));
+    assert_eq!(
+        bench.sent(),
+        [(0x585, vec![0x60, 0x11, 0x10, 1, 0, 0, 0, 0])]
+    );
+}
+
 /// The node does what it should after a reset.
 fn prove_alive(bench: &mut Bench) {
     bench.app.refuse = false;
+    restore(bench);
     bench.hear(0, &[129, ID]);
     assert_eq!(bench.sent(), [(0x705, vec![0])]);
+    assert_eq!(bench.app.coming, None, "a reset ends a transfer");
     bench.events();
     assert_eq!(
         bench.sdo([0x40, 0x18, 0x10, 4, 0, 0, 0, 0]),

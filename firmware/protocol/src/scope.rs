@@ -2,7 +2,7 @@
 
 use eel_canopen::Mapped;
 
-use crate::dictionary::{self, Lean};
+use crate::dictionary::{self, Served};
 
 /// The layout of a capture; another one has another number.
 pub const SCOPE_VERSION: u8 = 1;
@@ -213,13 +213,13 @@ impl ScopeHeader {
 
 /// Returns the entry that a channel captures: a number that may be read, in its whole length; `None`
 /// for any other.
-pub fn captured(channel: u32) -> Option<&'static Lean> {
+pub fn captured(channel: u32) -> Option<&'static Served> {
     let Mapped {
         index,
         subindex,
         bits,
     } = Mapped::from_raw(channel);
-    let entry = dictionary::lean(index, subindex).ok()?;
+    let entry = dictionary::served(index, subindex).ok()?;
     (!entry.data_type.is_domain() && entry.data_type.bits() == bits).then_some(entry)
 }
 

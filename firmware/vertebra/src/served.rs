@@ -34,7 +34,7 @@ impl Stream {
         if (index, subindex) == (STORE_EDS, 0) {
             return Ok(Self::Sheet);
         }
-        match dictionary::lean(index, subindex)?.field {
+        match dictionary::served(index, subindex)?.field {
             Field::RecordFreeze => Ok(Self::Freeze),
             Field::RecordScope => Ok(Self::Scope),
             Field::LinkData => Ok(Self::Link),
@@ -132,7 +132,7 @@ impl Application for Served<'_> {
             (STORE_FORMAT, 0) => PLAIN,
             (_, 0) => dictionary::highest(index)?,
             _ => {
-                let entry = dictionary::lean(index, subindex)?;
+                let entry = dictionary::served(index, subindex)?;
                 return entry.data_type.encode(self.value(entry.field), out);
             }
         };
@@ -141,7 +141,7 @@ impl Application for Served<'_> {
     }
 
     fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
-        let entry = dictionary::lean(index, subindex)?;
+        let entry = dictionary::served(index, subindex)?;
         self.set(entry.field, entry.accept(data)?)
     }
 

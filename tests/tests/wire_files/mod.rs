@@ -174,7 +174,7 @@ fn a_vertebra_serves_exactly_the_entries_of_its_data_sheet() {
             let is_served = match &answer {
                 Ok(_) => true,
                 // Known, but without data for now: an error field that holds no error.
-                Err(code) => *code == Abort::NoData as u32,
+                Err(code) => *code == Abort::NoData.code(),
             };
             let is_listed = sheet.contains_key(&(index, sub));
             assert_eq!(
@@ -250,8 +250,8 @@ fn a_vertebra_refuses_to_write_what_its_data_sheet_calls_read_only() {
         let bytes = &bytes[..bytes.len().min(4)];
         let answer = client.write(at, bytes);
         match entry.access.as_str() {
-            "ro" | "const" => assert_eq!(answer, Err(Abort::ReadOnly as u32), "{name}"),
-            "rw" | "rww" => assert_ne!(answer, Err(Abort::ReadOnly as u32), "{name}"),
+            "ro" | "const" => assert_eq!(answer, Err(Abort::ReadOnly.code()), "{name}"),
+            "rw" | "rww" => assert_ne!(answer, Err(Abort::ReadOnly.code()), "{name}"),
             other => panic!("{name} has access {other}"),
         }
     }

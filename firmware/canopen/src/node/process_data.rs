@@ -1,13 +1,12 @@
 //! PDOs: what SYNC and received frames do with them.
 
 use super::Node;
-use crate::emergency::Fault;
-use crate::objects::Objects;
-use crate::pdo::Received;
+use crate::emergency::{Emergency, Fault};
+use crate::pdo::{Received, Rpdo};
 use crate::{Application, Event, Mapped, NmtState};
 
 impl Node {
-    pub(super) fn synchronise(&mut self, now_us: u64, data: &[u8], app: &mut impl Application) {
+    pub(super) fn synchronise(&mut self, data: &[u8], app: &mut impl Application) {
         let Some(counter) = self.communication.sync.counter(data) else {
             self.events.push(Event::SyncLength);
             let length = data.len() as u8;
@@ -20,7 +19,10 @@ impl Node {
         let operational = self.state == NmtState::Operational;
         if operational {
             for place in 0..self.communication.rpdos.len() {
-                self.apply_rpdo(place, app);
+                let rpdo = self.communication.rpdos.get(place);
+                if rpdo.is_some_and(Rpdo::is_pending) {
+                    self.apply_rpdo(place, app);
+                }
             }
         }
         self.events.push(Event::Sync { counter });
@@ -29,7 +31,7 @@ impl Node {
             for place in 0..self.communication.tpdos.len() {
                 let tpdo = self.communication.tpdos.get_mut(place);
                 if tpdo.is_some_and(|tpdo| tpdo.is_due_at_sync(counter)) {
-                    self.send_tpdo(place, now_us, app);
+                    self.send_tpdo(place, app);
                 }
             }
         }
@@ -75,52 +77,46 @@ impl Node {
     }
 
     #[inline(never)] // One copy in flash.
-    pub(super) fn send_tpdo(&mut self, place: usize, now_us: u64, app: &mut impl Application) {
-        let Some(parameters) = self
-            .communication
-            .tpdos
-            .get(place)
-            .map(|tpdo| tpdo.parameters)
-        else {
-            return;
-        };
-        app.tpdo_due(place as u8 + 1, parameters.cob_id());
+    pub(super) fn send_tpdo(&mut self, place: usize, app: &mut impl Application) {
         let Self {
-            config,
             communication,
-            storing,
+            transmit,
             ..
         } = self;
-        let objects = Objects {
-            config,
-            communication,
-            app,
-            now_us,
-            storing,
-        };
-        let mut data = [0; 8];
-        if read_mapped(&objects, parameters.mapping(), &mut data).is_none() {
-            self.tpdos_refused = self.tpdos_refused.saturating_add(1);
+        let Some(tpdo) = communication.tpdos.get(place) else {
             return;
+        };
+        let parameters = &tpdo.parameters;
+        app.tpdo_due(place as u8 + 1, parameters.cob_id());
+        match read_mapped(parameters.mapping(), &communication.emergency, app) {
+            Some(data) => transmit.replace(parameters.cob_id(), data, parameters.bytes()),
+            None => self.tpdos_refused = self.tpdos_refused.saturating_add(1),
         }
-        let data = data.get(..usize::from(parameters.bytes())).unwrap_or(&[]);
-        self.transmit.replace(parameters.cob_id(), data);
     }
 }
 
 /// Puts the mapped objects one behind the other; `None` when one can't be read at its length.
-fn read_mapped<A: Application>(
-    objects: &Objects<'_, A>,
+fn read_mapped(
     mapping: &[Mapped],
-    data: &mut [u8; 8],
-) -> Option<()> {
-    let mut rest: &mut [u8] = data;
+    emergency: &Emergency,
+    app: &impl Application,
+) -> Option<[u8; 8]> {
+    let mut data = [0; 8];
+    let mut rest: &mut [u8] = &mut data;
     for mapped in mapping {
         let (slot, others) = rest.split_at_mut_checked(mapped.bytes())?;
-        if objects.read(mapped.index, mapped.subindex, slot) != Ok(slot.len()) {
+        let length = match mapped.index {
+            0x2000.. => app.read(mapped.index, mapped.subindex, slot).ok()?,
+            // The only one of the communication area that can be mapped.
+            _ => {
+                *slot.first_mut()? = emergency.register();
+                1
+            }
+        };
+        if length != slot.len() {
             return None;
         }
         rest = others;
     }
-    Some(())
+    Some(data)
 }

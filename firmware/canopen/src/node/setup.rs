@@ -13,6 +13,7 @@ const STORE_TIMEOUT_US: u64 = 1_000_000;
 impl Node {
     /// Writes the parameters of the communication area to the start of `out` and returns how many
     /// bytes they take, at most [`STORED_PARAMETERS`]; `None` when `out` is too short.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn save_parameters(&self, out: &mut [u8]) -> Option<usize> {
         stored::save(&self.communication, &self.config, out)
     }
@@ -28,6 +29,7 @@ impl Node {
     }
 
     /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not.
+    #[inline(never)] // One copy in flash, and a small one.
     pub fn finish_store(&mut self, now_us: u64, outcome: Result<(), Abort>) {
         self.expire_store(now_us);
         let request = self.storing.take();
@@ -117,7 +119,7 @@ impl Node {
 
     /// Serves the layer setting services.
     #[inline(never)] // One copy in flash.
-    pub(super) fn set_layer(&mut self, now_us: u64, data: &[u8], app: &impl Application) {
+    pub(super) fn set_layer(&mut self, now_us: u64, data: &[u8], app: &dyn Application) {
         let Ok(request) = data.try_into() else { return };
         let config = &self.config;
         let outcome = self
@@ -157,7 +159,7 @@ impl Node {
     }
 
     fn answer_lss(&mut self, answer: &[u8; 8]) {
-        self.transmit.push(lss::ANSWER, answer);
+        self.transmit.push(lss::ANSWER, *answer, 8);
     }
 }
 
@@ -169,6 +171,6 @@ fn refusal(request: Option<StoreRequest>, abort: Abort) -> [u8; 8] {
         Some(StoreRequest::NodeId(_)) | None => (0, 0),
     };
     let high = if low == 0 { 0 } else { 0x10 };
-    let [a, b, c, d] = (abort as u32).to_le_bytes();
+    let [a, b, c, d] = abort.code().to_le_bytes();
     [0x80, low, high, group, a, b, c, d]
 }

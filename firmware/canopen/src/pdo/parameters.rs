@@ -26,29 +26,6 @@ pub(crate) struct Parameters {
 }
 
 impl Parameters {
-    /// Makes a PDO from its default for node `node_id`.
-    #[inline(never)] // One copy in flash.
-    pub fn new(direction: Direction, default: &PdoDefault, node_id: u8) -> Self {
-        let mut parameters = Self {
-            direction,
-            enabled: false,
-            cob_id: default.cob_id_base.wrapping_add(u16::from(node_id)) & cob_id::MASK,
-            transmission: default.transmission,
-            count: 0,
-            bytes: 0,
-            mapping: [Mapped::default(); MAPPED_OBJECTS],
-        };
-        if default.is_valid() {
-            for (slot, mapped) in parameters.mapping.iter_mut().zip(default.mapping) {
-                *slot = *mapped;
-                parameters.count += 1;
-                parameters.bytes += mapped.bits / 8;
-            }
-            parameters.enabled = default.enabled;
-        }
-        parameters
-    }
-
     /// Makes a PDO that the node does not have.
     pub const fn absent(direction: Direction) -> Self {
         Self {
@@ -60,6 +37,24 @@ impl Parameters {
             bytes: 0,
             mapping: [Mapped::new(0, 0, 0); MAPPED_OBJECTS],
         }
+    }
+
+    /// Returns to the default for node `node_id`, in place.
+    #[inline(never)] // One copy in flash.
+    pub fn reset(&mut self, default: &PdoDefault, node_id: u8) {
+        let is_valid = default.is_valid();
+        let valid = if is_valid { default.mapping } else { &[] };
+        let mut bits = 0;
+        let mut rest = valid.iter();
+        for slot in &mut self.mapping {
+            *slot = rest.next().copied().unwrap_or_default();
+            bits += slot.bits;
+        }
+        self.enabled = is_valid && default.enabled;
+        self.cob_id = default.cob_id_base.wrapping_add(u16::from(node_id)) & cob_id::MASK;
+        self.transmission = default.transmission;
+        self.count = valid.len() as u8;
+        self.bytes = bits / 8;
     }
 
     pub const fn is_enabled(&self) -> bool {
@@ -97,6 +92,11 @@ impl Parameters {
     /// Returns all mapping entries, be they active or not.
     pub const fn entries(&self) -> &[Mapped; MAPPED_OBJECTS] {
         &self.mapping
+    }
+
+    /// Returns all mapping entries to be written over; [`restore`](Self::restore) must follow.
+    pub const fn entries_mut(&mut self) -> &mut [Mapped; MAPPED_OBJECTS] {
+        &mut self.mapping
     }
 
     /// Returns a mapping entry, 1–8, be it active or not.
@@ -221,20 +221,18 @@ impl Parameters {
         check_mapped(self.direction, mapped, described)
     }
 
-    /// Takes stored parameters over; `None` for those that can't be written either. The objects are
-    /// not looked at.
+    /// Takes stored parameters over, behind the mapping's entries; `None` for those that can't be written
+    /// either. The objects are not looked at.
     pub fn restore(
         &mut self,
         cob_id: u16,
         enabled: bool,
         transmission: u8,
         count: u8,
-        mapping: [Mapped; MAPPED_OBJECTS],
     ) -> Option<()> {
         // Disabled, the mapping may be changed and the identifier too.
         self.enabled = false;
         self.write_transmission(transmission).ok()?;
-        self.mapping = mapping;
         self.write_count(count).ok()?;
         let is_same = cob_id == self.cob_id;
         let parsed = if is_same && !enabled {

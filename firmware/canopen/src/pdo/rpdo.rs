@@ -24,18 +24,23 @@ pub(crate) struct Rpdo {
 }
 
 impl Rpdo {
-    pub fn new(default: Option<&PdoDefault>, node_id: u8) -> Self {
-        let parameters = match default {
-            Some(default) => Parameters::new(Direction::Receive, default, node_id),
-            None => Parameters::absent(Direction::Receive),
-        };
+    pub const fn absent() -> Self {
         Self {
-            parameters,
+            parameters: Parameters::absent(Direction::Receive),
             pending: None,
         }
     }
 
+    /// Returns to the default for node `node_id`, if the node has the PDO.
+    pub fn reset(&mut self, default: Option<&PdoDefault>, node_id: u8) {
+        self.pending = None;
+        if let Some(default) = default {
+            self.parameters.reset(default, node_id);
+        }
+    }
+
     /// Looks at a frame and keeps its data if it is this PDO's.
+    #[inline(never)] // One copy in flash.
     pub fn receive(&mut self, cob_id: u16, data: &[u8]) -> Received {
         if !self.parameters.is_enabled() || cob_id != self.parameters.cob_id() {
             return Received::Other;
@@ -53,6 +58,11 @@ impl Rpdo {
         } else {
             Received::Due
         }
+    }
+
+    /// Tells whether data waits.
+    pub const fn is_pending(&self) -> bool {
+        self.pending.is_some()
     }
 
     /// Forgets data that waits.

@@ -21,22 +21,29 @@ pub(crate) struct Tpdo {
 }
 
 impl Tpdo {
-    pub fn new(default: Option<&PdoDefault>, node_id: u8) -> Self {
-        let parameters = match default {
-            Some(default) => Parameters::new(Direction::Transmit, default, node_id),
-            None => Parameters::absent(Direction::Transmit),
-        };
+    pub const fn absent() -> Self {
         Self {
-            parameters,
+            parameters: Parameters::absent(Direction::Transmit),
             inhibit_100us: 0,
             event_ms: 0,
             sync_start: 0,
-            countdown: parameters.transmission(),
+            countdown: 0,
             awaits_start: false,
             requested: false,
             inhibited_until_us: 0,
             event_due_us: 0,
         }
+    }
+
+    /// Returns to the default for node `node_id`, if the node has the PDO.
+    pub fn reset(&mut self, default: Option<&PdoDefault>, node_id: u8) {
+        if let Some(default) = default {
+            self.parameters.reset(default, node_id);
+        }
+        self.inhibit_100us = 0;
+        self.event_ms = 0;
+        self.sync_start = 0;
+        self.restart(0);
     }
 
     /// Begins to count SYNCs and time: the node entered Operational, or the PDO was changed.
@@ -88,6 +95,7 @@ impl Tpdo {
     }
 
     /// Tells whether an event-driven PDO is due, and counts it as sent.
+    #[inline(never)] // One copy in flash.
     pub fn is_due_at(&mut self, now_us: u64) -> bool {
         if self
             .deadline_us()

@@ -3,7 +3,7 @@
 use super::block::Block;
 use super::{Buffer, Message, Multiplexor, SDO_BUFFER, SEGMENT};
 use crate::objects::Objects;
-use crate::{Abort, Access, Application};
+use crate::{Abort, Access};
 
 /// An object on its way from the client.
 #[derive(Clone, Debug)]
@@ -22,10 +22,10 @@ impl Download {
     ///
     /// # Errors
     /// The abort code to answer with.
-    pub fn open<A: Application>(
+    pub fn open(
         object: Multiplexor,
         size: Option<u32>,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<Self, Abort> {
         let Multiplexor { index, subindex } = object;
         let entry = objects.describe(index, subindex)?;
@@ -60,11 +60,11 @@ impl Download {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn expedited<A: Application>(
+    pub fn expedited(
         &mut self,
         data: [u8; 4],
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let length = self.expected.unwrap_or(4);
         let value = data.get(..length as usize).ok_or(Abort::TooShort)?;
@@ -75,11 +75,11 @@ impl Download {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn segment<A: Application>(
+    pub fn segment(
         &mut self,
         request: Message,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<bool, Abort> {
         if self.block.is_some() {
             return Err(Abort::Command);
@@ -99,11 +99,11 @@ impl Download {
     }
 
     /// Takes a segment of a block. What is wrong with it is remembered by the block.
-    pub fn block_segment<A: Application>(
+    pub fn block_segment(
         &mut self,
         request: Message,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) {
         let [first, data @ ..] = request;
         let before = self.block.as_mut().and_then(|b| b.accept(first, data));
@@ -119,11 +119,11 @@ impl Download {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn end_blocks<A: Application>(
+    pub fn end_blocks(
         &mut self,
         request: Message,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let [command, low, high, ..] = request;
         let held = self.block.as_mut().and_then(Block::take_last);
@@ -148,11 +148,7 @@ impl Download {
     ///
     /// # Errors
     /// The abort code to answer with.
-    pub fn finish<A: Application>(
-        &self,
-        buffer: &Buffer,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    pub fn finish(&self, buffer: &Buffer, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let Multiplexor { index, subindex } = self.object;
         if self.domain {
             return objects.app.end_domain(index, subindex, Some(self.received));
@@ -163,11 +159,11 @@ impl Download {
 
     /// Takes the next bytes: of a value to the buffer, of a domain to the application.
     #[inline(never)] // One copy in flash.
-    fn take<A: Application>(
+    fn take(
         &mut self,
         bytes: &[u8],
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let total = self.received.saturating_add(bytes.len() as u32);
         if self.expected.is_some_and(|expected| total > expected) {

@@ -53,9 +53,16 @@ impl Server {
         self.object = Multiplexor::NONE;
     }
 
+    /// Tells whether the application has begun to write a domain, so that [`settle`](Self::settle) may
+    /// have something to tell it.
+    #[inline]
+    pub const fn has_begun(&self) -> bool {
+        self.begun.is_some()
+    }
+
     /// Tells the application of a domain whose download was broken off. To be called after everything
     /// that may break one off.
-    pub fn settle(&mut self, app: &mut impl Application) {
+    pub fn settle(&mut self, app: &mut dyn Application) {
         if !matches!(self.transfer, Transfer::Download(_))
             && let Some(Multiplexor { index, subindex }) = self.begun.take()
         {
@@ -97,11 +104,7 @@ impl Server {
     }
 
     /// Answers a request; `None` when it needs no answer.
-    pub fn request<A: Application>(
-        &mut self,
-        request: Message,
-        objects: &mut Objects<'_, A>,
-    ) -> Option<Message> {
+    pub fn request(&mut self, request: Message, objects: &mut Objects<'_>) -> Option<Message> {
         self.answer = None;
         match self.serve(request, objects) {
             Ok(()) => self.answer,
@@ -120,7 +123,7 @@ impl Server {
     }
 
     /// Makes the next segment of a block upload: at most one for each that the client asked for.
-    pub fn segment<A: Application>(&mut self, objects: &mut Objects<'_, A>) -> Option<Message> {
+    pub fn segment(&mut self, objects: &mut Objects<'_>) -> Option<Message> {
         let Transfer::Upload(upload) = &mut self.transfer else {
             return None;
         };
@@ -133,11 +136,7 @@ impl Server {
     }
 
     #[inline(never)] // One copy in flash.
-    fn serve<A: Application>(
-        &mut self,
-        request: Message,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn serve(&mut self, request: Message, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let [command, first, second, ..] = request;
         if let Transfer::Download(download) = &self.transfer
             && download.is_in_block()
@@ -183,7 +182,7 @@ impl Server {
     fn abort(&mut self, abort: Abort) -> Message {
         let object = self.object;
         self.reset();
-        message(ABORT, object, (abort as u32).to_le_bytes())
+        message(ABORT, object, abort.code().to_le_bytes())
     }
 
     fn upload(&mut self) -> Result<&mut Upload, Abort> {
@@ -202,7 +201,7 @@ impl Server {
 
     /// Ends what runs and names the object of the request, from now on. Returns the other four bytes.
     #[inline(never)] // One copy in flash.
-    fn start<A: Application>(&mut self, request: Message, objects: &mut Objects<'_, A>) -> [u8; 4] {
+    fn start(&mut self, request: Message, objects: &mut Objects<'_>) -> [u8; 4] {
         let [_, low, high, subindex, data @ ..] = request;
         self.reset();
         self.settle(objects.app);
@@ -213,21 +212,17 @@ impl Server {
         data
     }
 
-    fn start_upload<A: Application>(
-        &mut self,
-        request: Message,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn start_upload(&mut self, request: Message, objects: &mut Objects<'_>) -> Result<(), Abort> {
         self.start(request, objects);
         let upload = Upload::open(self.object, &mut self.buffer, objects)?;
         self.answer_upload(upload, objects)
     }
 
     /// Answers with the object itself where it fits, otherwise with its length.
-    fn answer_upload<A: Application>(
+    fn answer_upload(
         &mut self,
         mut upload: Upload,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let length = upload.length();
         if !matches!(length, 1..=4) {
@@ -242,11 +237,7 @@ impl Server {
         Ok(())
     }
 
-    fn upload_segment<A: Application>(
-        &mut self,
-        command: u8,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn upload_segment(&mut self, command: u8, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let Transfer::Upload(upload) = &mut self.transfer else {
             return Err(Abort::Command);
         };
@@ -259,10 +250,10 @@ impl Server {
         Ok(())
     }
 
-    fn start_block_upload<A: Application>(
+    fn start_block_upload(
         &mut self,
         request: Message,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let [command, ..] = request;
         let [size, threshold, ..] = self.start(request, objects);
@@ -279,11 +270,7 @@ impl Server {
         Ok(())
     }
 
-    fn start_download<A: Application>(
-        &mut self,
-        request: Message,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn start_download(&mut self, request: Message, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let [command, ..] = request;
         let data = self.start(request, objects);
         let expedited = command & 2 != 0;
@@ -302,10 +289,10 @@ impl Server {
         Ok(())
     }
 
-    fn start_block_download<A: Application>(
+    fn start_block_download(
         &mut self,
         request: Message,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let [command, ..] = request;
         let data = self.start(request, objects);
@@ -316,11 +303,11 @@ impl Server {
     }
 
     #[inline(never)] // One copy in flash.
-    fn open_download<A: Application>(
+    fn open_download(
         &mut self,
         size: Option<u32>,
         block: Option<Block>,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let mut download = Download::open(self.object, size, objects)?;
         self.begun = download.domain.then_some(self.object);
@@ -329,10 +316,10 @@ impl Server {
         Ok(())
     }
 
-    fn download_segment<A: Application>(
+    fn download_segment(
         &mut self,
         request: Message,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let [command, ..] = request;
         let (download, buffer) = self.download()?;
@@ -343,11 +330,7 @@ impl Server {
         Ok(())
     }
 
-    fn block_segment<A: Application>(
-        &mut self,
-        request: Message,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn block_segment(&mut self, request: Message, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let [first, ..] = request;
         let (download, buffer) = self.download()?;
         download.block_segment(request, buffer, objects);
@@ -361,10 +344,10 @@ impl Server {
         Ok(())
     }
 
-    fn end_block_download<A: Application>(
+    fn end_block_download(
         &mut self,
         request: Message,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let (download, buffer) = self.download()?;
         download.end_blocks(request, buffer, objects)?;
@@ -374,10 +357,7 @@ impl Server {
     }
 
     #[inline(never)] // One copy in flash.
-    fn finish_download<A: Application>(
-        &mut self,
-        objects: &mut Objects<'_, A>,
-    ) -> Result<(), Abort> {
+    fn finish_download(&mut self, objects: &mut Objects<'_>) -> Result<(), Abort> {
         let Transfer::Download(download) = &self.transfer else {
             return Err(Abort::General);
         };

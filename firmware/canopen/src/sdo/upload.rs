@@ -3,7 +3,7 @@
 use super::crc::Crc;
 use super::{BLOCK, Buffer, Message, Multiplexor, SDO_BUFFER, SEGMENT};
 use crate::objects::Objects;
-use crate::{Abort, Access, Application};
+use crate::{Abort, Access};
 
 /// An object on its way to the client.
 ///
@@ -48,10 +48,10 @@ impl Upload {
     ///
     /// # Errors
     /// The abort code to answer with.
-    pub fn open<A: Application>(
+    pub fn open(
         object: Multiplexor,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<Self, Abort> {
         let Multiplexor { index, subindex } = object;
         let entry = objects.describe(index, subindex)?;
@@ -83,10 +83,10 @@ impl Upload {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn first<A: Application>(
+    pub fn first(
         &mut self,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<[u8; SEGMENT], Abort> {
         self.bytes_at(self.base, buffer, objects)
     }
@@ -95,11 +95,11 @@ impl Upload {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn segment<A: Application>(
+    pub fn segment(
         &mut self,
         command: u8,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<Message, Abort> {
         if self.block.is_some() {
             return Err(Abort::Command);
@@ -143,10 +143,10 @@ impl Upload {
     ///
     /// # Errors
     /// The abort code that ends the transfer.
-    pub fn next<A: Application>(
+    pub fn next(
         &mut self,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<Message, Abort> {
         let sequence = self.block.as_ref().map_or(0, |block| block.sequence);
         let at = self.base.saturating_add(bytes_in(sequence));
@@ -225,11 +225,11 @@ impl Upload {
 
     /// Returns the bytes from `at` on, which the application is asked for only once.
     #[inline(never)] // One copy in flash.
-    fn bytes_at<A: Application>(
+    fn bytes_at(
         &mut self,
         at: u32,
         buffer: &mut Buffer,
-        objects: &mut Objects<'_, A>,
+        objects: &mut Objects<'_>,
     ) -> Result<[u8; SEGMENT], Abort> {
         let carried = self.length.saturating_sub(at).min(SEGMENT as u32) as usize;
         let start = at as usize % SDO_BUFFER;

@@ -106,6 +106,10 @@ pub struct Store {
     pub pose: i16,
     pub status: u32,
     pub text: Vec<u8>,
+    /// 0x2023: a domain.
+    pub domain: Vec<u8>,
+    /// How much of a domain has come, while one comes.
+    pub coming: Option<u32>,
     pub refuse: bool,
     pub refuse_configuration: bool,
 }
@@ -120,6 +124,8 @@ impl Store {
             pose: 0x1122,
             status: 0x3344_5566,
             text: Vec::new(),
+            domain: (0..2_000_u32).map(|at| at as u8).collect(),
+            coming: None,
             refuse: false,
             refuse_configuration: false,
         }
@@ -137,14 +143,15 @@ impl Application for Store {
             (0x2020, 0) => (0, Access::ReadWrite, false, false),
             (0x2021, 0) => (4, Access::WriteOnly, false, false),
             (0x2022, 0) => (8, Access::ReadWrite, true, true),
-            (0x2000 | 0x2001 | 0x2010 | 0x2020 | 0x2021 | 0x2022, _) => {
+            (0x2023, 0) => (0, Access::ReadWrite, false, false),
+            (0x2000 | 0x2001 | 0x2010 | 0x2020..=0x2023, _) => {
                 return Err(Abort::NoSubindex);
             }
             _ => return Err(Abort::NoObject),
         };
         Ok(Entry {
             length,
-            domain: false,
+            domain: index == 0x2023,
             access,
             tpdo,
             rpdo,
@@ -190,6 +197,37 @@ impl Application for Store {
             _ => return Err(Abort::NoObject),
         }
         self.calls.push(Call::Write(index, subindex, data.to_vec()));
+        Ok(())
+    }
+
+    fn open_domain(&mut self, _: u16, _: u8) -> Result<u32, Abort> {
+        Ok(self.domain.len() as u32)
+    }
+
+    fn read_domain(&mut self, _: u16, _: u8, offset: u32, out: &mut [u8]) -> Result<usize, Abort> {
+        let rest = self.domain.get(offset as usize..).ok_or(Abort::NoData)?;
+        let length = rest.len().min(out.len());
+        out[..length].copy_from_slice(&rest[..length]);
+        Ok(length)
+    }
+
+    fn begin_domain(&mut self, _: u16, _: u8, _: Option<u32>) -> Result<(), Abort> {
+        assert_eq!(self.coming.replace(0), None, "the one before was ended");
+        Ok(())
+    }
+
+    fn write_domain(&mut self, _: u16, _: u8, offset: u32, data: &[u8]) -> Result<(), Abort> {
+        assert_eq!(self.coming, Some(offset), "in order and without gaps");
+        self.coming = Some(offset + data.len() as u32);
+        if self.refuse {
+            return Err(Abort::Hardware);
+        }
+        Ok(())
+    }
+
+    fn end_domain(&mut self, _: u16, _: u8, length: Option<u32>) -> Result<(), Abort> {
+        let came = self.coming.take();
+        assert!(came.is_some() && (length.is_none() || length == came));
         Ok(())
     }
 

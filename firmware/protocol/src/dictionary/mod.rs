@@ -5,14 +5,14 @@
 //! is written; EDS, DBC and the tables of the documentation come from it. A vertebra serves the
 //! entries by a `match` over [`Field`], so the compiler refuses a table entry that nobody serves.
 
-mod lean;
+mod served;
 mod table;
 
 use core::fmt;
 
-use eel_canopen::{Abort, Access};
+use eel_canopen::{Abort, Access, Entry};
 
-pub use lean::{Lean, entry, highest, lean};
+pub use served::{ENTRIES, Served, highest, served};
 pub use table::{Field, OBJECTS};
 
 /// The record whose entries are settings.
@@ -186,13 +186,7 @@ impl DataType {
             return Err(Abort::UnsupportedAccess);
         }
         let (low, high) = self.range();
-        let bytes = value.clamp(low, high).to_le_bytes();
-        let length = usize::from(self.length());
-        let (Some(out), Some(bytes)) = (out.get_mut(..length), bytes.get(..length)) else {
-            return Err(Abort::OutOfMemory);
-        };
-        out.copy_from_slice(bytes);
-        Ok(length)
+        self.put(value.clamp(low, high) as u32, out)
     }
 }
 
@@ -247,6 +241,24 @@ pub(crate) const fn lookup(index: u16, subindex: u8) -> Option<&'static Sub> {
         }
         _ => None,
     }
+}
+
+/// Describes an entry to a CANopen node; subindex 0 is a constant byte.
+///
+/// # Errors
+/// [`Abort::NoObject`] or [`Abort::NoSubindex`].
+pub fn entry(index: u16, subindex: u8) -> Result<Entry, Abort> {
+    if subindex == 0 {
+        highest(index)?;
+        return Ok(Entry {
+            length: 1,
+            domain: false,
+            access: Access::Constant,
+            tpdo: false,
+            rpdo: false,
+        });
+    }
+    served(index, subindex).map(Served::entry)
 }
 
 /// Returns every entry with its record, in the order of the dictionary.

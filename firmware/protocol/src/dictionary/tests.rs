@@ -15,21 +15,53 @@ fn every_entry_is_found_where_it_stands_and_nothing_else_is() {
             match (by_search, find(index, subindex)) {
                 (None, answer) => {
                     assert_eq!(answer, Err(Abort::NoObject));
-                    assert_eq!(lean(index, subindex), Err(Abort::NoObject));
+                    assert_eq!(served(index, subindex), Err(Abort::NoObject));
                 }
                 (Some(None), answer) => {
                     assert_eq!(answer, Err(Abort::NoSubindex));
-                    assert_eq!(lean(index, subindex), Err(Abort::NoSubindex));
+                    assert_eq!(served(index, subindex), Err(Abort::NoSubindex));
                 }
                 (Some(Some(sub)), answer) => {
                     assert_eq!(answer.map(|(_, sub)| sub), Ok(sub));
-                    assert_eq!(lean(index, subindex), Ok(&sub.lean()));
+                    serves_as_the_table_says(sub, served(index, subindex).unwrap());
                     found += 1;
                 }
             }
         }
     }
     assert_eq!(found, entries().count());
+}
+
+/// Holds what is served of an entry against its place in the table.
+fn serves_as_the_table_says(sub: &Sub, served: &Served) {
+    assert_eq!(served.field, sub.field);
+    assert_eq!(served.data_type, sub.data_type);
+    assert_eq!(served.bounds(), (sub.min, sub.max));
+    let entry = served.entry();
+    assert_eq!(entry.length, sub.data_type.length());
+    assert_eq!(entry.access, sub.access);
+    assert_eq!(entry.tpdo, sub.pdo == Pdo::Transmit);
+    assert_eq!(entry.rpdo, sub.pdo == Pdo::Receive);
+    let writable = !matches!(sub.access, Access::Constant | Access::ReadOnly);
+    if !writable || sub.data_type.is_domain() {
+        return;
+    }
+    let (least, most) = sub.data_type.range();
+    for value in [sub.min - 1, sub.min, sub.default, sub.max, sub.max + 1] {
+        if !(least..=most).contains(&value) {
+            continue;
+        }
+        let bytes = value.to_le_bytes();
+        let expected = if value < sub.min {
+            Err(Abort::ValueTooLow)
+        } else if value > sub.max {
+            Err(Abort::ValueTooHigh)
+        } else {
+            Ok(value)
+        };
+        let bytes = &bytes[..usize::from(sub.data_type.length())];
+        assert_eq!(served.accept(bytes), expected);
+    }
 }
 
 #[test]
@@ -120,20 +152,17 @@ fn a_domain_has_no_number_and_says_so() {
 
 #[test]
 fn a_value_outside_the_bounds_is_refused_with_the_code_that_says_so() {
-    let (_, yaw) = find(0x2020, 8).unwrap();
-    assert_eq!(yaw.lean().accept(&5_236_i16.to_le_bytes()), Ok(5_236));
+    let yaw = served(0x2020, 8).unwrap();
+    assert_eq!(yaw.accept(&5_236_i16.to_le_bytes()), Ok(5_236));
     assert_eq!(
-        yaw.lean().accept(&5_237_i16.to_le_bytes()),
+        yaw.accept(&5_237_i16.to_le_bytes()),
         Err(Abort::ValueTooHigh)
     );
-    assert_eq!(
-        yaw.lean().accept(&(-1_i16).to_le_bytes()),
-        Err(Abort::ValueTooLow)
-    );
-    assert_eq!(yaw.lean().accept(&[1]), Err(Abort::TooShort));
-    assert_eq!(yaw.lean().accept(&[1, 2, 3]), Err(Abort::TooLong));
-    let (_, pose) = find(0x2010, 1).unwrap();
-    assert_eq!(pose.lean().accept(&[0, 0]), Err(Abort::ReadOnly));
+    assert_eq!(yaw.accept(&(-1_i16).to_le_bytes()), Err(Abort::ValueTooLow));
+    assert_eq!(yaw.accept(&[1]), Err(Abort::TooShort));
+    assert_eq!(yaw.accept(&[1, 2, 3]), Err(Abort::TooLong));
+    let pose = served(0x2010, 1).unwrap();
+    assert_eq!(pose.accept(&[0, 0]), Err(Abort::ReadOnly));
 }
 
 #[test]

@@ -48,7 +48,7 @@ impl Record {
     pub(crate) fn keep_settings(&mut self, settings: &Settings) {
         self.settings.clear();
         for (index, subindex) in dictionary::settings() {
-            let field = dictionary::lean(index, subindex).map(|entry| entry.field);
+            let field = dictionary::served(index, subindex).map(|entry| entry.field);
             let Some(value) = field.ok().and_then(|field| settings.value(field)) else {
                 continue;
             };
@@ -75,7 +75,10 @@ impl Record {
             let &[low, high, subindex, number @ ..]: &[u8; SETTING] = entry;
             let index = u16::from_le_bytes([low, high]);
             let is_known = dictionary::settings().any(|place| place == (index, subindex));
-            let Some(known) = dictionary::lean(index, subindex).ok().filter(|_| is_known) else {
+            let Some(known) = dictionary::served(index, subindex)
+                .ok()
+                .filter(|_| is_known)
+            else {
                 continue;
             };
             let raw = u32::from_le_bytes(number);
@@ -84,7 +87,8 @@ impl Record {
             } else {
                 i64::from(raw)
             };
-            if value < known.min || value > known.max || !changed.set(known.field, value) {
+            let (least, most) = known.bounds();
+            if value < least || value > most || !changed.set(known.field, value) {
                 return false;
             }
         }

@@ -341,10 +341,11 @@ fn no_record_whatever_it_holds_makes_a_vertebra_with_settings_out_of_bounds() {
         let mut settings = Settings::unconfigured(1);
         let mut expected = Vec::new();
         for (index, subindex) in dictionary::settings() {
-            let entry = dictionary::lean(index, subindex).unwrap();
+            let entry = dictionary::served(index, subindex).unwrap();
             // Mostly within the bounds, of which few are that wide.
-            let span = (entry.max - entry.min + 1) as u64;
-            let inside = entry.min + (random.next() % span) as i64;
+            let (least, most) = entry.bounds();
+            let span = (most - least + 1) as u64;
+            let inside = least + (random.next() % span) as i64;
             let value = match random.next() % 40 {
                 0 => i64::from(random.next() as i32),
                 _ => inside,
@@ -363,10 +364,10 @@ fn no_record_whatever_it_holds_makes_a_vertebra_with_settings_out_of_bounds() {
         let vertebra = Vertebra::with_stored(Settings::unconfigured(1), &store.load(), now);
         let found: Vec<_> = dictionary::settings()
             .map(|(index, subindex)| {
-                let entry = dictionary::lean(index, subindex).unwrap();
+                let entry = dictionary::served(index, subindex).unwrap();
                 let value = vertebra.core.settings.value(entry.field).unwrap();
                 assert!(
-                    (entry.min..=entry.max).contains(&value),
+                    (entry.bounds().0..=entry.bounds().1).contains(&value),
                     "{entry:?}: {value}"
                 );
                 Some(value)
