@@ -21,7 +21,7 @@ use eel_units::Instant;
 use eel_vertebra::Drive;
 
 use crate::plant::{Config as PlantConfig, Plant};
-use crate::robot::{NODES, NativeNode, Node, PLANT_STEP_NS, TICK_NS};
+use crate::robot::{NODES, NativeNode, Node, PLANT_STEP_NS, SENDING, TICK_NS};
 
 pub use pace::{CATCH_UP_TICKS, Pace};
 
@@ -30,8 +30,8 @@ const RECEIVED_PER_TICK: usize = 256;
 /// A frame that seems to come from farther ahead than this was there when the host's clock was set
 /// back: 1 s.
 const CLOCK_SET_NS: u64 = 1_000_000_000;
-/// Frames that wait to be sent while the bus takes none.
-const WAITING: usize = 1024;
+/// Frames that wait for the bus at which the nodes send no more.
+const BEHIND: usize = 64;
 
 /// What happened so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub struct Counters {
     pub received: u64,
     /// Frames sent.
     pub sent: u64,
-    /// Frames thrown away because the bus took none for too long.
+    /// Frames that found no room in their node because the bus took none for too long.
     pub dropped: u64,
 }
 
@@ -140,6 +140,12 @@ impl<B: Bus> Realtime<B> {
     fn tick_until(&mut self, until_ns: u64) -> Result<(), BusError> {
         self.receive(until_ns)?;
         let now = Instant::from_micros(self.counters.ticks * TICK_NS / 1_000);
+        // A bus that takes none soon gets none: what the nodes say is not to be old when it goes out.
+        let room = if self.outgoing.len() < BEHIND {
+            SENDING
+        } else {
+            0
+        };
         let (heard, mut frames, mut sent) = (std::mem::take(&mut self.local), vec![], vec![]);
         for (id, node) in &mut self.nodes {
             let index = id.index();
@@ -148,7 +154,7 @@ impl<B: Bus> Realtime<B> {
             frames.extend(others.map(|(_, frame)| *frame));
             frames.extend_from_slice(&self.incoming);
             let sample = self.plant.sample(index);
-            self.drives[index] = node.turn(now, &frames, &sample, &mut sent);
+            self.drives[index] = node.turn(now, &frames, &sample, room, &mut sent);
             self.local
                 .extend(sent.drain(..).map(|frame| (index, frame)));
         }
@@ -156,6 +162,8 @@ impl<B: Bus> Realtime<B> {
             self.plant.step(&self.drives);
         }
         self.counters.ticks += 1;
+        let vertebrae = self.nodes.iter().filter_map(|(_, node)| node.vertebra());
+        self.counters.dropped = vertebrae.map(|v| u64::from(v.frames_dropped())).sum();
         self.send()
     }
 
@@ -200,11 +208,7 @@ impl<B: Bus> Realtime<B> {
     /// Sends what waits, as far as the bus takes it.
     fn send(&mut self) -> Result<(), BusError> {
         for (_, frame) in &self.local {
-            if self.outgoing.len() < WAITING {
-                self.outgoing.push_back(*frame);
-            } else {
-                self.counters.dropped += 1;
-            }
+            self.outgoing.push_back(*frame);
         }
         while let Some(frame) = self.outgoing.front() {
             match self.bus.send(frame) {

@@ -89,6 +89,7 @@ impl Observer for Recorder {
                 now: turn.now,
                 sample: *turn.sample,
                 frames,
+                room: turn.room as u8,
             });
         }
     }
@@ -239,12 +240,14 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                 let mut output = Output {
                     drives: [Drive::Off; 3],
                     frames: Default::default(),
-                    lost: 0,
                 };
                 let heard = input.frames.iter().copied();
-                output.drives = turn(vertebra, input.now, heard, &input.sample, |frame| {
-                    let kept = output.frames.push(frame);
-                    output.lost += u8::from(kept.is_err());
+                let (sample, room) = (&input.sample, input.room.into());
+                output.drives = turn(vertebra, input.now, heard, sample, room, |frame| {
+                    output
+                        .frames
+                        .push(frame)
+                        .expect("room for what was asked for");
                 });
                 store::serve(vertebra, &mut store, input.now);
                 outputs.push(output);

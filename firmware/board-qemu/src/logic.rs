@@ -56,19 +56,13 @@ mod image {
             now,
             sample,
             frames: heard,
+            room,
         } = input;
-        let drives = turn(vertebra, now, heard.iter().copied(), &sample, |frame| {
+        let heard = heard.iter().copied();
+        let drives = turn(vertebra, now, heard, &sample, room.into(), |frame| {
             black_box(frames.push(frame).is_ok());
         });
-        black_box(
-            lockstep::Output {
-                drives,
-                frames,
-                lost: 0,
-            }
-            .encode()
-            .as_bytes(),
-        );
+        black_box(lockstep::Output { drives, frames }.encode().as_bytes());
         black_box((
             vertebra.state(),
             vertebra.status(),

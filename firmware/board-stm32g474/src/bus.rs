@@ -10,7 +10,7 @@ use core::num::{NonZeroU8, NonZeroU16};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use eel_drivers::Backoff;
-use eel_protocol::{Cob, Frame, HEAD_NODE, NodeId};
+use eel_protocol::Frame;
 use embassy_futures::select::{Either, select};
 use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::filter::{Action, Filter, FilterType, StandardFilter};
@@ -25,8 +25,11 @@ use embassy_time::{Instant, Timer};
 
 use crate::liveness;
 
-/// Frames that wait for the control tick, and frames that wait for the bus.
+/// Frames that wait for the control tick.
 pub const QUEUE: usize = 32;
+/// Frames that wait for the bus: about what it carries in a tick. What finds no room waits in the node,
+/// which knows what is urgent and what is old.
+const SENDING: usize = 8;
 /// Time between two signs of life.
 const PULSE_MS: u64 = 5;
 /// Signs of life for which a frame waits for the bus before it is dropped: 20 ms, two SYNCs.
@@ -51,7 +54,7 @@ bind_interrupts!(struct Interrupts {
 /// Frames from the bus.
 pub static RECEIVED: Channel<CriticalSectionRawMutex, Frame, QUEUE> = Channel::new();
 /// Frames for the bus.
-pub static TO_SEND: Channel<CriticalSectionRawMutex, Frame, QUEUE> = Channel::new();
+pub static TO_SEND: Channel<CriticalSectionRawMutex, Frame, SENDING> = Channel::new();
 /// How often the bus went off.
 static BUS_OFFS: AtomicU32 = AtomicU32::new(0);
 static RECEIVE_OVERRUNS: AtomicU32 = AtomicU32::new(0);
@@ -68,7 +71,7 @@ pub struct Connections {
 }
 
 /// Starts the controller.
-pub fn start(connections: Connections, node: Option<NodeId>) -> Can<'static> {
+pub fn start(connections: Connections) -> Can<'static> {
     let Connections {
         can,
         receive,
@@ -84,29 +87,16 @@ pub fn start(connections: Connections, node: Option<NodeId>) -> Can<'static> {
         .set_tx_buffer_mode(TxBufferMode::Fifo)
         .set_automatic_bus_off_recovery(false);
     bus.set_config(config);
-    hear(bus.properties(), node);
     bus.into_normal_mode()
 }
 
-/// Lets pass what a vertebra with this node id hears, which is what its node acts on by default and
-/// what the simulator's vertebrae hear; the controller drops everything else.
-pub fn hear(controller: &Properties, node: Option<NodeId>) {
+/// Lets pass what the vertebra listens to; the controller drops everything else.
+pub fn hear(controller: &Properties, identifiers: &[u16]) {
     let mut filters = [StandardFilter::disable(); 28];
-    let always = [
-        Cob::Nmt,
-        Cob::Sync,
-        Cob::Time,
-        Cob::Heartbeat(HEAD_NODE),
-        Cob::LssRequest,
-    ];
-    let own = node
-        .map(NodeId::get)
-        .into_iter()
-        .flat_map(|node| [Cob::Target(node), Cob::Moment(node), Cob::SdoRequest(node)]);
-    for (slot, cob) in filters.iter_mut().zip(always.into_iter().chain(own)) {
+    for (slot, identifier) in filters.iter_mut().zip(identifiers) {
         *slot = Filter {
             filter: FilterType::BitMask {
-                filter: cob.id(),
+                filter: *identifier,
                 mask: 0x7FF,
             },
             action: Action::StoreInFifo0,
@@ -118,6 +108,11 @@ pub fn hear(controller: &Properties, node: Option<NodeId>) {
 /// Counts a frame that is lost.
 fn count(overruns: &AtomicU32) {
     overruns.fetch_add(1, Ordering::Relaxed);
+}
+
+/// Returns how many frames find room to wait for the bus.
+pub fn room() -> usize {
+    TO_SEND.free_capacity()
 }
 
 /// Queues a frame for the bus; counts it as lost where there is no room.

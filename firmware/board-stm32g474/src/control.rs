@@ -6,7 +6,7 @@ use eel_drivers::Orientation;
 use eel_protocol::NodeId;
 use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::store::{StoreError, Stored};
-use eel_vertebra::{Event, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Event, Identifiers, Sample, Settings, Vertebra, turn};
 use embassy_stm32::can::Properties;
 use embassy_time::{Duration, Instant, Ticker};
 
@@ -64,7 +64,6 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         currents.take();
         liveness::CONTROL.advance();
     }
-    let filters = hardware.filters;
     let Birth {
         settings,
         stored,
@@ -74,14 +73,27 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         Start::Ordered => Vertebra::with_stored(settings, &stored, now()),
         Start::Failed => Vertebra::after_failure(settings, &stored, now()),
     };
+    let mut heard = Identifiers::new();
     loop {
         ticker.next().await;
+        let identifiers = vertebra.identifiers();
+        if identifiers != heard {
+            bus::hear(&hardware.filters, &identifiers);
+            heard = identifiers;
+        }
         let start = Instant::now();
         let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
-        let drives = turn(&mut vertebra, now(), frames, &sample, bus::send);
+        let drives = turn(
+            &mut vertebra,
+            now(),
+            frames,
+            &sample,
+            bus::room(),
+            bus::send,
+        );
         bridges.apply(drives);
-        report(&mut vertebra, &filters);
+        report(&mut vertebra);
         store(&mut vertebra);
         let (received, transmitted) = bus::overruns();
         vertebra.note_overruns(received, transmitted);
@@ -131,8 +143,8 @@ fn store(vertebra: &mut Vertebra) {
     }
 }
 
-/// Logs what happened, and lets the identifiers of a new node id pass.
-fn report(vertebra: &mut Vertebra, filters: &Properties) {
+/// Logs what happened.
+fn report(vertebra: &mut Vertebra) {
     while let Some(event) = vertebra.poll_event() {
         match event {
             Event::State { from, to } => defmt::info!("{=str} -> {=str}", from.name(), to.name()),
@@ -142,7 +154,6 @@ fn report(vertebra: &mut Vertebra, filters: &Properties) {
             Event::Reset => defmt::info!("reset by the head"),
             Event::NodeId(node) => {
                 defmt::info!("node id {=u8} by LSS", node.map_or(0, NodeId::get));
-                bus::hear(filters, node);
             }
         }
     }

@@ -86,7 +86,7 @@ fn start(p: Peripherals, cause: failure::Start) -> Storage {
         receive: p.PA11,
         transmit: p.PA12,
     };
-    let (transmit, receive, filters) = bus::start(can, node).split();
+    let (transmit, receive, filters) = bus::start(can).split();
     spawn(&bus, bus::receive(receive));
     spawn(&bus, bus::transmit(transmit));
     let hardware = control::Hardware {

@@ -86,7 +86,7 @@ pub use emergency::{REGISTER_COMMUNICATION, REGISTER_GENERIC};
 pub use event::{Event, Group, StoreRequest};
 pub use frame::{Frame, Id};
 pub use nmt::{NmtCommand, NmtState};
-pub use node::{Counters, Node};
+pub use node::{Counters, Identifiers, Node};
 pub use queue::EventQueue;
 pub use sdo::SDO_BUFFER;
 pub use stored::STORED_PARAMETERS;

@@ -259,6 +259,32 @@ fn sync_can_have_another_identifier_but_no_impossible_one() {
 }
 
 #[test]
+fn tells_which_identifiers_it_listens_to() {
+    let mut bench = Bench::pre_operational();
+    let listens = |bench: &Bench| {
+        let mut identifiers = bench.node.identifiers().to_vec();
+        identifiers.sort_unstable();
+        identifiers
+    };
+    assert_eq!(
+        listens(&bench),
+        [0x000, 0x080, 0x100, 0x205, 0x305, 0x605, 0x77F, 0x7E5]
+    );
+    assert_eq!(bench.write(0x1400, 1, 0x8000_0205, 4), Ok(()));
+    assert_eq!(bench.write(0x1400, 1, 0x222, 4), Ok(()));
+    assert_eq!(bench.write(0x1401, 1, 0x8000_0305, 4), Ok(()));
+    assert_eq!(bench.write(0x1005, 0, 0x081, 4), Ok(()));
+    assert_eq!(bench.write(0x1012, 0, 0x100, 4), Ok(()));
+    assert_eq!(bench.write(0x1016, 1, 0, 4), Ok(()));
+    assert_eq!(listens(&bench), [0x000, 0x081, 0x222, 0x605, 0x7E5]);
+    let mute = Bench::with(Config {
+        node_id: 0xFF,
+        ..CONFIG
+    });
+    assert_eq!(listens(&mute), [0x7E5]);
+}
+
+#[test]
 fn ignores_remote_and_extended_frames() {
     let mut bench = Bench::pre_operational();
     let standard = embedded_can::StandardId::new(0x705).unwrap();

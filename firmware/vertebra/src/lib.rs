@@ -40,6 +40,7 @@ mod vertebra;
 mod workspace;
 
 pub use command::TARGET_TIMEOUT;
+pub use eel_canopen::Identifiers;
 pub use events::Event;
 pub use io::{Drive, Sample};
 pub use machine::{STOP_BRAKE, STOP_DAMPED};

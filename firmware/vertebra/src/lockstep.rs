@@ -14,20 +14,20 @@ use heapless::Vec;
 use crate::io::{Drive, Sample};
 
 /// The layout; another one has another number.
-pub const VERSION: u8 = 1;
-/// The most frames of a packet: twice what a node queues for one turn.
+pub const VERSION: u8 = 2;
+/// The most frames of a packet: more than a node queues.
 pub const MAX_FRAMES: usize = 32;
 /// Length of a header in bytes.
 pub const HEADER: usize = 4;
 /// Length of the longest packet in bytes, header included.
-pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + MAX_FRAMES * FRAME;
+pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + 1 + MAX_FRAMES * FRAME;
 
 const TIME: usize = 8;
 const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1;
 const FRAME: usize = 4 + 1 + 8;
 const DRIVES: usize = 3 * (1 + 4);
 
-const _: () = assert!(1 + DRIVES + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
+const _: () = assert!(DRIVES + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
 
 const EXTENDED: u32 = 1 << 31;
@@ -89,6 +89,8 @@ pub struct Input {
     pub sample: Sample,
     /// What it hears, in this order.
     pub frames: Frames,
+    /// How many frames the bus takes, at most [`MAX_FRAMES`].
+    pub room: u8,
 }
 
 /// What a vertebra makes of a turn.
@@ -98,8 +100,6 @@ pub struct Output {
     pub drives: [Drive; 3],
     /// What it sends, in this order.
     pub frames: Frames,
-    /// How many frames found no room in the packet.
-    pub lost: u8,
 }
 
 /// An encoded packet.
@@ -214,6 +214,7 @@ impl Input {
         let mut packet = Packet::new(Kind::Input);
         packet.put(&self.now.to_micros().to_le_bytes());
         put_sample(&mut packet, &self.sample);
+        packet.put(&[self.room]);
         packet.put_frames(&self.frames);
         packet.finish()
     }
@@ -226,12 +227,17 @@ impl Input {
         let mut reader = Reader { bytes: body };
         let now = reader.take_instant()?;
         let sample = take_sample(&mut reader)?;
+        let room = reader.take_u8()?;
+        if usize::from(room) > MAX_FRAMES {
+            return Err(PacketError::Value);
+        }
         let frames = reader.take_frames()?;
         reader.finish()?;
         Ok(Self {
             now,
             sample,
             frames,
+            room,
         })
     }
 }
@@ -250,7 +256,6 @@ impl Output {
             packet.put_i32(duty);
         }
         packet.put_frames(&self.frames);
-        packet.put(&[self.lost]);
         packet.finish()
     }
 
@@ -270,13 +275,8 @@ impl Output {
             };
         }
         let frames = reader.take_frames()?;
-        let lost = reader.take_u8()?;
         reader.finish()?;
-        Ok(Self {
-            drives,
-            frames,
-            lost,
-        })
+        Ok(Self { drives, frames })
     }
 }
 

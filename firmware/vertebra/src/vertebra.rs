@@ -1,6 +1,6 @@
 //! The vertebra as its platform sees it.
 
-use eel_canopen::{Config, Frame, Identity, NmtCommand, NmtState, Node, StoreRequest};
+use eel_canopen::{Config, Frame, Identifiers, Identity, NmtCommand, NmtState, Node, StoreRequest};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
 use eel_protocol::freeze::TimeOfDay;
@@ -41,20 +41,26 @@ pub(crate) struct Storing {
     pub coming: Option<Record>,
 }
 
-/// Does one turn: all frames in their order, the sample, then everything that is to be sent.
+/// Does one turn: all frames in their order, the sample, then what is to be sent, at most `room`
+/// frames. What finds no room stays with the node, where a newer report takes the place of an older
+/// one and an SDO transfer waits until all else is gone.
 /// Every platform calls this once per control tick, so that all agree on the order.
 pub fn turn(
     vertebra: &mut Vertebra,
     now: Instant,
     frames: impl IntoIterator<Item = Frame>,
     sample: &Sample,
+    room: usize,
     mut send: impl FnMut(Frame),
 ) -> [Drive; 3] {
     for frame in frames {
         vertebra.handle_frame(now, &frame);
     }
     let drives = vertebra.handle_sample(now, sample);
-    while let Some(frame) = vertebra.poll_transmit() {
+    for _ in 0..room {
+        let Some(frame) = vertebra.poll_transmit() else {
+            break;
+        };
         send(frame);
     }
     drives
@@ -187,6 +193,16 @@ impl Vertebra {
     /// arrived, or arrived and not believed.
     pub fn targets_lost(&self) -> u32 {
         self.core.stream.counters().lost
+    }
+
+    /// Returns how many frames found no room to wait in, because the bus took none for too long.
+    pub fn frames_dropped(&self) -> u32 {
+        self.node.counters().transmit_dropped
+    }
+
+    /// Returns the identifiers that the vertebra listens to at present, for its controller's filters.
+    pub fn identifiers(&self) -> Identifiers {
+        self.node.identifiers()
     }
 
     /// Returns the state of the node on the bus.

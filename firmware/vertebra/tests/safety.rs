@@ -2,10 +2,10 @@
 
 use eel_canopen::NmtCommand;
 use eel_protocol::emergency::Emergency;
-use eel_protocol::{Condition, Mode, State};
+use eel_protocol::{Cob, Condition, Mode, State};
 use eel_vertebra::Drive;
 
-use support::{Bench, faulty, pose, stays_off, stopping};
+use support::{Bench, faulty, node, pose, stays_off, stopping};
 
 mod support;
 
@@ -41,6 +41,28 @@ fn lost_targets_damp_within_100_ms_and_free_within_2500_ms_for_any_phase_of_the_
         bench.recover();
         assert!(!bench.holds(Condition::CommandLost) && !bench.holds(Condition::Latched));
     }
+}
+
+#[test]
+fn what_a_stalled_bus_does_not_take_is_renewed_and_no_report_waits_twice() {
+    let mut bench = Bench::running();
+    bench.room = 0;
+    let from = bench.millis;
+    bench.run(60);
+    assert!(bench.sent.iter().all(|sent| sent.at <= from));
+    bench.room = 1;
+    bench.run(4);
+    let late: Vec<u16> = bench
+        .sent
+        .iter()
+        .filter(|sent| sent.at > from)
+        .filter_map(|sent| sent.frame.cob_id())
+        .collect();
+    let own = node().get();
+    let poses = late.iter().filter(|id| **id == Cob::Pose(own).id());
+    assert_eq!(poses.count(), 1, "{late:X?}");
+    assert!(late.len() <= 3 + 1, "{late:X?}");
+    assert_eq!(bench.vertebra.frames_dropped(), 0);
 }
 
 #[test]

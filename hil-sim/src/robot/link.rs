@@ -6,8 +6,10 @@ use eel_protocol::Frame;
 
 use crate::bus::{Bus, ControllerConfig, ControllerId};
 
-/// Frames that a program's queue holds, each way.
+/// Frames that wait for a program.
 const DEPTH: usize = 32;
+/// Frames of a vertebra that wait for the controller, as on its board.
+pub const SENDING: usize = 8;
 
 /// One program's end of the bus.
 #[derive(Debug)]
@@ -64,6 +66,11 @@ impl Link {
         }
         self.waiting.push_back(frame);
         self.serve(bus, now_ns);
+    }
+
+    /// Returns how many frames find room to wait.
+    pub fn room(&self) -> usize {
+        SENDING.saturating_sub(self.waiting.len())
     }
 
     /// Takes what was received since the last call.

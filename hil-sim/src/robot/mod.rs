@@ -25,7 +25,7 @@ use crate::plant::{Config as PlantConfig, Plant};
 
 pub use clock::{PLANT_STEP_NS, TICK_NS};
 pub use fault::{Fault, FaultKind};
-pub use link::Link;
+pub use link::{Link, SENDING};
 pub use node::{NativeNode, Node, Turn};
 
 use clock::{Happening, Schedule};
@@ -259,7 +259,8 @@ impl Robot {
         let seat = &mut self.nodes[index];
         let frames = seat.link.received();
         let mut sent = Vec::new();
-        seat.drives = seat.node.turn(now, &frames, &sample, &mut sent);
+        let room = seat.link.room();
+        seat.drives = seat.node.turn(now, &frames, &sample, room, &mut sent);
         for frame in &sent {
             seat.link.send(&mut self.bus, self.now_ns, *frame);
         }
@@ -267,6 +268,7 @@ impl Robot {
             now,
             frames: &frames,
             sample: &sample,
+            room,
             sent: &sent,
             drives: seat.drives,
         };

@@ -14,6 +14,8 @@ pub struct Turn<'a> {
     pub frames: &'a [Frame],
     /// What it measured.
     pub sample: &'a Sample,
+    /// How many frames its platform took at most.
+    pub room: usize,
     /// What it sent.
     pub sent: &'a [Frame],
     /// What its bridges do.
@@ -22,12 +24,13 @@ pub struct Turn<'a> {
 
 /// Something that is a vertebra: natively, in an emulator, or on a board.
 pub trait Node {
-    /// Takes one turn of the control tick and appends what is to be sent.
+    /// Takes one turn of the control tick and appends what is to be sent, at most `room` frames.
     fn turn(
         &mut self,
         now: Instant,
         frames: &[Frame],
         sample: &Sample,
+        room: usize,
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3];
 
@@ -89,10 +92,11 @@ impl Node for NativeNode {
         now: Instant,
         frames: &[Frame],
         sample: &Sample,
+        room: usize,
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3] {
         let frames = frames.iter().copied();
-        let drives = turn(&mut self.vertebra, now, frames, sample, |frame| {
+        let drives = turn(&mut self.vertebra, now, frames, sample, room, |frame| {
             sent.push(frame);
         });
         store::serve(&mut self.vertebra, &mut self.store, now);

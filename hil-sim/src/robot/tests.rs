@@ -29,6 +29,7 @@ impl Node for Deaf {
         now: Instant,
         frames: &[Frame],
         sample: &Sample,
+        room: usize,
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3] {
         let runs = self.state() == Some(State::Run);
@@ -50,7 +51,7 @@ impl Node for Deaf {
                 heard.remove(place);
             }
         }
-        self.node.turn(now, &heard, sample, sent)
+        self.node.turn(now, &heard, sample, room, sent)
     }
 
     fn reset(&mut self, now: Instant) {

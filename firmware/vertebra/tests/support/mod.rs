@@ -71,6 +71,8 @@ pub struct Bench {
     pub counts: bool,
     /// What the bridges were told last.
     pub drives: [Drive; 3],
+    /// How many frames the bus takes in a tick.
+    pub room: usize,
     /// Everything that was sent.
     pub sent: Vec<Sent>,
     /// Frames to give to the vertebra in the next tick, before all others.
@@ -105,6 +107,7 @@ impl Bench {
             damage: 0,
             counts: true,
             drives: [Drive::Off; 3],
+            room: usize::MAX,
             sent: Vec::new(),
             extra: Vec::new(),
             store: Store::new(RamFlash::new()),
@@ -198,6 +201,7 @@ impl Bench {
             now,
             frames.iter().copied(),
             &self.sample,
+            self.room,
             |frame| sent.push(Sent { at, frame }),
         );
         store::serve(&mut self.vertebra, &mut self.store, now);
