@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::bus::{self, AnyBus, BusOption, Consent};
 use super::live::{Live, Outcome};
+use crate::source;
 use crate::usage::Usage;
 
 /// How long another head is listened for.
@@ -143,6 +144,7 @@ impl Head {
         let mut live = Live::new(bus, config, self.json);
         live.resets_first = self.reset;
         let limit = self.seconds.map(Duration::from_secs_f64);
+        source::catch_interrupt()?;
         let outcome = live.run(limit)?;
         self.tell(&outcome)?;
         Ok(u64::from(!outcome.is_fine()))

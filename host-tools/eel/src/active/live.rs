@@ -1,19 +1,17 @@
 //! The head in real time on a bus.
 
 use std::collections::VecDeque;
-use std::fmt;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
 use eel_client::NmtCommand;
 use eel_head::{Config, Event, Head, Phase};
-use eel_protocol::emergency::{self, Severity};
 use eel_protocol::{Cob, Frame, NodeId};
 use eel_transport::{Bus, BusError, Received};
-use serde_json::json;
 
 use super::bus::AnyBus;
+use super::events::{Who, is_trouble, json_of, words};
 use crate::source;
 
 /// Time between two calls of the head.
@@ -106,12 +104,12 @@ impl Live {
         }
     }
 
-    /// Leads until `limit` or Ctrl-C and stops in order; a second Ctrl-C ends it at once.
+    /// Leads until `limit` or Ctrl-C and stops in order; a second Ctrl-C ends it at once. Ctrl-C must be
+    /// [caught](source::catch_interrupt) already.
     ///
     /// # Errors
     /// What the bus fails with.
     pub fn run(&mut self, limit: Option<Duration>) -> Result<Outcome> {
-        source::catch_interrupt()?;
         self.start = Instant::now();
         let result = self.lead(limit);
         self.status.clear();
@@ -265,34 +263,6 @@ impl Live {
     }
 }
 
-/// Vertebrae as a list, `vertebrae 1-3, 7`; the head for none.
-struct Who<'a>(&'a [u8]);
-
-impl fmt::Display for Who<'_> {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            [] => return write!(out, "head"),
-            [one] => return write!(out, "vertebra {one}"),
-            _ => write!(out, "vertebrae")?,
-        }
-        let mut rest = self.0;
-        let mut lead = ' ';
-        while let [first, others @ ..] = rest {
-            let follows = (1..)
-                .zip(others)
-                .take_while(|(step, node)| **node == first + step);
-            let run = follows.count();
-            write!(out, "{lead}{first}")?;
-            if run > 0 {
-                write!(out, "-{}", first + run as u8)?;
-            }
-            lead = ',';
-            rest = others.get(run..).unwrap_or(&[]);
-        }
-        Ok(())
-    }
-}
-
 fn told(error: &BusError) -> anyhow::Error {
     // The message of a bus error holds its cause already.
     anyhow!(error.to_string())
@@ -338,95 +308,70 @@ impl Status {
     }
 }
 
-fn is_trouble(event: &Event) -> bool {
-    match event {
-        Event::Lost(_) | Event::Latched(..) | Event::NotStopped(_) => true,
-        Event::Emergency(_, report) => {
-            emergency::from_code(report.code).is_none_or(|known| known.severity == Severity::Fault)
-        }
-        Event::Booted(_) | Event::Running(_) | Event::GaitStarted | Event::Stopped => false,
-    }
-}
-
-/// Returns whose event it is, and the event in words.
-fn words(event: &Event, acknowledged: bool) -> (Option<u8>, String) {
-    let (node, text) = match event {
-        Event::Booted(node) => (node, "on the bus".to_owned()),
-        Event::Running(node) => (node, "follows the gait".to_owned()),
-        Event::Lost(node) => (node, "fell silent: check its supply and cable".to_owned()),
-        Event::Latched(node, state) if acknowledged => (
-            node,
-            format!("was latched ({}), acknowledged", state.name()),
-        ),
-        Event::Latched(node, state) => (
-            node,
-            format!(
-                "latched ({}): find the cause, then start the head with --reset",
-                state.name()
-            ),
-        ),
-        Event::Emergency(node, report) => {
-            let text = match emergency::from_code(report.code) {
-                Some(known) if known.severity == Severity::Cleared => {
-                    format!("{}: {}", known.name, known.sentence)
-                }
-                Some(known) => format!(
-                    "{} {}: {}",
-                    known.severity.name(),
-                    known.name,
-                    known.sentence
-                ),
-                None => format!("emergency 0x{:04X}", report.code),
-            };
-            (node, text)
-        }
-        Event::GaitStarted => return (None, "the gait begins".to_owned()),
-        Event::Stopped => return (None, "all drives are off".to_owned()),
-        Event::NotStopped(node) => (node, "was told to switch off and still drives".to_owned()),
-    };
-    (Some(node.get()), text)
-}
-
-fn json_of(event: &Event, elapsed: Duration) -> serde_json::Value {
-    let mut all = json!({"time_s": elapsed.as_secs_f64()});
-    let (name, node) = match event {
-        Event::Booted(node) => ("booted", Some(node)),
-        Event::Running(node) => ("running", Some(node)),
-        Event::Lost(node) => ("lost", Some(node)),
-        Event::Latched(node, state) => {
-            all["state"] = json!(state.name());
-            ("latched", Some(node))
-        }
-        Event::Emergency(node, report) => {
-            all["code"] = json!(report.code);
-            if let Some(known) = emergency::from_code(report.code) {
-                all["name"] = json!(known.name);
-                all["severity"] = json!(known.severity.name());
-                all["sentence"] = json!(known.sentence);
-            }
-            ("emergency", Some(node))
-        }
-        Event::GaitStarted => ("gait-started", None),
-        Event::Stopped => ("stopped", None),
-        Event::NotStopped(node) => ("not-stopped", Some(node)),
-    };
-    all["event"] = json!(name);
-    if let Some(node) = node {
-        all["node"] = json!(node.get());
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use eel_head::Gait;
+
     use super::*;
 
+    /// A bus that takes two frames of three, or none at all.
+    struct Narrow {
+        taken: Arc<Mutex<Vec<Frame>>>,
+        offered: u32,
+        is_stuck: bool,
+    }
+
+    impl Bus for Narrow {
+        fn send(&mut self, frame: &Frame) -> Result<(), BusError> {
+            self.offered += 1;
+            if self.is_stuck || self.offered.is_multiple_of(3) {
+                return Err(BusError::Full);
+            }
+            self.taken.lock().unwrap().push(*frame);
+            Ok(())
+        }
+
+        fn receive(&mut self, _: Duration) -> Result<Option<Received>, BusError> {
+            Ok(None)
+        }
+    }
+
+    fn live(is_stuck: bool) -> (Live, Arc<Mutex<Vec<Frame>>>) {
+        let taken = Arc::default();
+        let narrow = Narrow {
+            taken: Arc::clone(&taken),
+            offered: 0,
+            is_stuck,
+        };
+        let config = Config::new(Gait::SWIM);
+        (Live::new(Box::new(narrow), config, true), taken)
+    }
+
     #[test]
-    fn vertebrae_are_listed_in_runs() {
-        let who = |nodes: &[u8]| Who(nodes).to_string();
-        assert_eq!(who(&[]), "head");
-        assert_eq!(who(&[3]), "vertebra 3");
-        assert_eq!(who(&[1, 2, 3, 7, 9, 10]), "vertebrae 1-3,7,9-10");
-        assert_eq!(who(&[2, 1]), "vertebrae 2,1");
+    fn no_frame_is_lost_while_the_queue_is_full_and_the_end_is_in_order() {
+        let (mut live, taken) = live(false);
+        let outcome = live.run(Some(Duration::from_millis(100))).unwrap();
+        let taken = taken.lock().unwrap();
+        assert_eq!(outcome.sent, taken.len() as u64);
+        let syncs = taken.iter().filter(|frame| frame.cob_id() == Some(0x080));
+        let counters: Vec<u8> = syncs.map(|frame| frame.data()[0]).collect();
+        assert!(counters.len() > 50 && counters[0] == 1, "{counters:?}");
+        assert!(counters.windows(2).all(|pair| pair[1] == pair[0] % 240 + 1));
+        let end = Frame::standard(0x000, &[0x80, 0]).unwrap();
+        assert!(taken.iter().rev().take(4).any(|frame| *frame == end));
+        // Nobody swam: that is no success.
+        assert!(!outcome.at_once && !outcome.is_fine());
+    }
+
+    #[test]
+    fn a_bus_that_takes_nothing_ends_the_head_with_the_reason() {
+        let (mut live, _) = live(true);
+        let error = live.run(None).unwrap_err();
+        assert!(
+            error.to_string().contains("no other node acknowledges"),
+            "{error}"
+        );
     }
 }

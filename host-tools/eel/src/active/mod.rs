@@ -1,6 +1,7 @@
 //! The commands that send: bring-up of nodes, and the head.
 
 mod bus;
+mod events;
 mod head;
 mod live;
 mod lss;
