@@ -8,6 +8,7 @@ import peer
 
 # A bit of the identity that is 1 is known by silence, for this long.
 SILENCE_S = 0.12
+PRODUCT = 0x6565_6C01
 
 
 def scan(lss):
@@ -28,6 +29,19 @@ def scan(lss):
         found.append([identity, inquired, before, lss.inquire_node_id()])
         lss.send_switch_state_global(lss.WAITING_STATE)
     return found
+
+
+def identify(bus, lss):
+    """Asks whether there is anybody without an id, and by a range of serial numbers; returns who answers."""
+    told = []
+    for ask in (
+        lss.send_identify_non_configured_remote_slave,
+        lambda: lss.send_identify_remote_slave(0, PRODUCT, 0, 0xFFFF_FFFF, 0, 0xFFFF_FFFF),
+    ):
+        mark = bus.mark()
+        ask()
+        told.append([data[0] for data in bus.wait(0x7E4, count=2, mark=mark)])
+    return told
 
 
 def refusals(lss, identity):
@@ -52,7 +66,7 @@ with peer.bus() as bus:
     lss = bus.network.lss
     lss.RESPONSE_TIMEOUT = SILENCE_S
     mark = bus.mark()
-    found = {"scanned": scan(lss)}
+    found = {"identified": identify(bus, lss), "scanned": scan(lss)}
     lss.RESPONSE_TIMEOUT = peer.PATIENCE_S
     # Each boots with its id as soon as it is back in waiting state.
     found["booted"] = [bus.wait(0x700 + node_id, mark=mark)[0][0] for node_id in (3, 5)]

@@ -19,13 +19,12 @@ RESET = 15  # mode of a target: acknowledges the stop
 
 
 class Head:
-    """What a head sends in a beat, and the states that answer it."""
+    """What a head sends in a beat, and the states that answer."""
 
     def __init__(self, bus):
         self.bus, self.node, self.beat = bus, bus.node(3), 0
         self.node.rpdo.read(from_od=True)
-        self.node.tpdo.read(from_od=True)
-        self.states = []
+        self.mark = bus.mark()
 
     def beats(self, count, mode, heartbeats):
         for _ in range(count):
@@ -35,12 +34,12 @@ class Head:
             nod.send_target(self.node.rpdo[1], 0.0, mode, self.beat)
             self.beat += 1
             time.sleep(nod.BEAT_S)
-            self.states.append(self.node.tpdo[1]["pose.code"].raw & 0x0F)
 
     def seen(self):
-        """Returns the states so far without repetitions, and forgets them."""
-        states, self.states = self.states, []
-        return [state for state, _ in itertools.groupby(states)]
+        """Returns the states of the poses since the last time, without repetitions."""
+        poses = self.bus.since(self.mark, 0x183)
+        self.mark = self.bus.mark()
+        return [state for state, _ in itertools.groupby(pose[6] & 0x0F for pose in poses)]
 
 
 def freeze_frame(node):

@@ -2,7 +2,7 @@
 
 use std::env;
 
-use eel_protocol::Cob;
+use eel_protocol::{Cob, Frame};
 use eel_transport::{Bus, SocketBus};
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ fn wait_for_heartbeat(bus: &mut SocketBus) {
     let heartbeat = Some(Cob::Heartbeat(3).id());
     loop {
         let received = bus.receive(PATIENCE).unwrap().expect("a heartbeat");
-        if received.frame().and_then(|frame| frame.cob_id()) == heartbeat {
+        if received.frame().and_then(Frame::cob_id) == heartbeat {
             return;
         }
     }
