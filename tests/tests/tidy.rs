@@ -23,11 +23,12 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "board-stm32g474",
         &["eel-vertebra", "eel-drivers", "eel-protocol", "eel-units"],
     ),
-    // Its second binary links every logic crate, so the head too, to look for panics; its third
-    // counts the instructions of the kinematics.
+    // Beside the vertebra it links every logic crate, so the head too, to look for panics, and counts
+    // the instructions of the kinematics and of the CANopen node.
     (
         "board-qemu",
         &[
+            "eel-canopen",
             "eel-vertebra",
             "eel-protocol",
             "eel-units",
@@ -327,7 +328,10 @@ fn the_conformance_list_names_tests_and_peers_that_exist() {
             named += 1;
         }
         for script in quoted(peers) {
-            assert!(root.join("tests/python").join(script).is_file(), "no {script}");
+            assert!(
+                root.join("tests/python").join(script).is_file(),
+                "no {script}"
+            );
         }
     }
     assert!(named > 40, "{named} tests are named");

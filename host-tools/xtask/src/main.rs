@@ -11,6 +11,7 @@ mod exhaustive;
 mod firmware;
 mod generated;
 mod image;
+mod node;
 mod panics;
 mod process;
 mod proofs;
@@ -79,15 +80,19 @@ enum Task {
     /// Checks every single input of the fixed-point primitives, on all processors of this machine.
     Exhaustive,
     /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU, beside f32 with
-    /// libm; weighs its flash, compares its errors, and hashes its answers on all machines.
+    /// libm; weighs its flash, compares its errors, and hashes its answers on all machines. Then the
+    /// instructions that each kind of frame costs the CANopen node, its flash and its RAM.
     Cycles {
         /// Prints JSON.
         #[arg(long)]
         json: bool,
-        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %, or when spread,
-        /// flash, or the distance to f32 miss their bound.
+        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %, when spread,
+        /// flash, or the distance to f32 miss their bound, or the node firmware/canopen/budget.json.
         #[arg(long)]
         check: bool,
+        /// Measures the CANopen node alone.
+        #[arg(long)]
+        node: bool,
     },
 }
 
@@ -106,7 +111,7 @@ fn main() -> ExitCode {
         Task::Panics => panics::check(),
         Task::Exhaustive => exhaustive::check(),
         Task::Proofs => proofs::run(),
-        Task::Cycles { json, check } => cycles::run(json, check),
+        Task::Cycles { json, check, node } => cycles::run(json, check, node),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -43,9 +43,9 @@ const STEPS: [Step; 13] = [
         run: panics::check,
     },
     Step {
-        name: "the kernel's budgets",
+        name: "budgets of kernel and node",
         in_fast: false,
-        run: || cycles::run(false, true),
+        run: || cycles::run(false, true, false),
     },
     Step {
         name: "proofs",
