@@ -64,6 +64,10 @@ const IMPORTS: &[(&str, &[&str])] = &[
         ],
     ),
     ("xtask", &[]),
+    (
+        "eel-fuzz",
+        &["eel-canopen", "eel-protocol", "eel-units", "eel-vertebra"],
+    ),
 ];
 /// The crate that may import everything.
 const TESTS: &str = "eel-tests";
@@ -295,6 +299,7 @@ fn manifests_share_the_workspace_s_lints() {
 fn manifest_of(name: &str) -> String {
     let folder = match name {
         "hil-sim" => "hil-sim".to_owned(),
+        "eel-fuzz" => "tests/fuzz".to_owned(),
         "eel" | "xtask" => format!("host-tools/{name}"),
         "eel-client" | "eel-transport" => {
             format!("host-tools/{}", name.trim_start_matches("eel-"))

@@ -9,6 +9,7 @@ mod cycles;
 mod errors;
 mod exhaustive;
 mod firmware;
+mod fuzz;
 mod generated;
 mod image;
 mod node;
@@ -19,6 +20,7 @@ mod setup;
 mod suite;
 mod vcan;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -67,6 +69,20 @@ enum Task {
         #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
         command: Vec<String>,
     },
+    /// Looks with libFuzzer for inputs that break a promise (tests/fuzz).
+    Fuzz {
+        /// node, sdo, lss, stored or vertebra; all of them when not given.
+        target: Option<String>,
+        /// For how long each.
+        #[arg(long, default_value_t = suite::FUZZ_SECONDS)]
+        seconds: u64,
+        /// Puts the inputs that are worth it into tests/fuzz/corpus, and looks for no new ones.
+        #[arg(long)]
+        minimise: bool,
+        /// Runs this one input, without libFuzzer.
+        #[arg(long, value_name = "FILE")]
+        reproduce: Option<PathBuf>,
+    },
     /// Installs what the tests need, or names what is missing and how to get it.
     Setup,
     /// Prints flash and RAM use of the images that were built last.
@@ -106,6 +122,17 @@ fn main() -> ExitCode {
             Ok(status) => return ExitCode::from(status),
             Err(error) => Err(error),
         },
+        Task::Fuzz {
+            target,
+            reproduce: Some(input),
+            ..
+        } => fuzz::reproduce(target.as_deref(), &input),
+        Task::Fuzz {
+            target,
+            seconds,
+            minimise,
+            reproduce: None,
+        } => fuzz::run_targets(target.as_deref(), seconds, minimise),
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
