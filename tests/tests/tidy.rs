@@ -23,11 +23,12 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "board-stm32g474",
         &["eel-vertebra", "eel-drivers", "eel-protocol", "eel-units"],
     ),
-    // Its second binary links every logic crate, so the head too, to look for panics; its third
-    // counts the instructions of the kinematics.
+    // Beside the vertebra it links every logic crate, so the head too, to look for panics, and counts
+    // the instructions of the kinematics and of the CANopen node.
     (
         "board-qemu",
         &[
+            "eel-canopen",
             "eel-vertebra",
             "eel-protocol",
             "eel-units",
@@ -63,6 +64,10 @@ const IMPORTS: &[(&str, &[&str])] = &[
         ],
     ),
     ("xtask", &[]),
+    (
+        "eel-fuzz",
+        &["eel-canopen", "eel-protocol", "eel-units", "eel-vertebra"],
+    ),
 ];
 /// The crate that may import everything.
 const TESTS: &str = "eel-tests";
@@ -294,6 +299,7 @@ fn manifests_share_the_workspace_s_lints() {
 fn manifest_of(name: &str) -> String {
     let folder = match name {
         "hil-sim" => "hil-sim".to_owned(),
+        "eel-fuzz" => "tests/fuzz".to_owned(),
         "eel" | "xtask" => format!("host-tools/{name}"),
         "eel-client" | "eel-transport" => {
             format!("host-tools/{}", name.trim_start_matches("eel-"))

@@ -1,5 +1,5 @@
 //! What the wrist's kernel costs and how exact it is: instructions in QEMU, bytes of flash, errors, and
-//! whether every machine answers with the same bits.
+//! whether every machine answers with the same bits. What the CANopen node costs comes with it.
 //!
 //! Instructions are no cycles, and no stand-in for a measurement on silicon.
 
@@ -13,6 +13,7 @@ use crate::counts::{Counts, TOLERANCE};
 use crate::cross;
 use crate::errors::Errors;
 use crate::image::Image;
+use crate::node::Node;
 use crate::process::{self, cargo, clean_root, command, output, run as run_command};
 
 /// A processor that is measured, and the machine of QEMU that has it.
@@ -73,24 +74,46 @@ struct Measured {
     flash: Flash,
 }
 
-/// Measures on both processors, prints, and compares the answers with this machine's.
+/// Measures on both processors, prints, and compares the answers with this machine's; the CANopen node
+/// too, or alone.
 ///
 /// # Errors
 /// When an image can't be built or fails, its answers differ from the native ones, or while `check` is
 /// set a budget, the spread or the ceiling of flash is exceeded, or single precision comes too near.
-pub fn run(json: bool, check: bool) -> Result<()> {
+pub fn run(json: bool, check: bool, node_alone: bool) -> Result<()> {
     let Some(emulator) = process::find("qemu-system-arm") else {
         bail!("qemu-system-arm is missing; Debian has it in the package of that name");
     };
+    let (mut found, mut complaints) = (json!({}), Vec::new());
+    if !node_alone {
+        (found, complaints) = measure_kernel(&emulator, json, check)?;
+    }
+    let node = Node::measure(&CORES[0], &emulator)?;
+    if json {
+        found["node"] = node.to_json();
+        println!("{found:#}");
+    } else {
+        println!("\n{node}");
+    }
+    if check {
+        complaints.extend(node.complaints()?);
+        ensure!(complaints.is_empty(), "{}", complaints.join("; "));
+        if !json {
+            println!("everything is within its bound");
+        }
+    }
+    Ok(())
+}
+
+/// Measures the kernel, prints unless JSON is wanted, and returns that with what exceeds its bound.
+fn measure_kernel(emulator: &Path, json: bool, check: bool) -> Result<(Value, Vec<String>)> {
     let errors = Errors::read(&native("cycles")?)?;
     let answers = Answers::read(&native("answers")?)?;
     let mut all = Vec::new();
     for core in &CORES {
-        all.push(Measured::take(core, &emulator)?);
+        all.push(Measured::take(core, emulator)?);
     }
-    if json {
-        println!("{:#}", to_json(&all, &answers, &errors));
-    } else {
+    if !json {
         all.iter().for_each(Measured::print);
         println!("\n{errors}");
         println!("\n{answers}, this machine");
@@ -103,14 +126,12 @@ pub fn run(json: bool, check: bool) -> Result<()> {
             measured.answers
         );
     }
-    if check {
-        let complaints = complaints(&all, &errors)?;
-        ensure!(complaints.is_empty(), "{}", complaints.join("; "));
-        if !json {
-            println!("every median, spread, ratio, error and size is within its bound");
-        }
-    }
-    Ok(())
+    let complaints = if check {
+        complaints(&all, &errors)?
+    } else {
+        Vec::new()
+    };
+    Ok((to_json(&all, &answers, &errors), complaints))
 }
 
 /// Returns what exceeds its bound.
@@ -189,7 +210,10 @@ impl Measured {
 
 impl Core {
     /// Runs an image in QEMU and returns what it printed.
-    fn run(&self, emulator: &Path, binary: &str, options: &[&str]) -> Result<String> {
+    ///
+    /// # Errors
+    /// When QEMU can't be started or the image fails.
+    pub fn run(&self, emulator: &Path, binary: &str, options: &[&str]) -> Result<String> {
         let mut machine = command(emulator);
         machine
             .args(["-M", self.machine, "-display", "none", "-monitor", "none"])

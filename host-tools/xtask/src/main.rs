@@ -9,8 +9,10 @@ mod cycles;
 mod errors;
 mod exhaustive;
 mod firmware;
+mod fuzz;
 mod generated;
 mod image;
+mod node;
 mod panics;
 mod process;
 mod proofs;
@@ -18,6 +20,7 @@ mod setup;
 mod suite;
 mod vcan;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -66,6 +69,20 @@ enum Task {
         #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
         command: Vec<String>,
     },
+    /// Looks with libFuzzer for inputs that break a promise (tests/fuzz).
+    Fuzz {
+        /// node, sdo, lss, stored or vertebra; all of them when not given.
+        target: Option<String>,
+        /// For how long each.
+        #[arg(long, default_value_t = suite::FUZZ_SECONDS)]
+        seconds: u64,
+        /// Puts the inputs that are worth it into tests/fuzz/corpus, and looks for no new ones.
+        #[arg(long)]
+        minimise: bool,
+        /// Runs this one input, without libFuzzer.
+        #[arg(long, value_name = "FILE")]
+        reproduce: Option<PathBuf>,
+    },
     /// Installs what the tests need, or names what is missing and how to get it.
     Setup,
     /// Prints flash and RAM use of the images that were built last.
@@ -79,15 +96,19 @@ enum Task {
     /// Checks every single input of the fixed-point primitives, on all processors of this machine.
     Exhaustive,
     /// Counts the instructions of the wrist's kernel on Cortex-M4 and Cortex-M3 in QEMU, beside f32 with
-    /// libm; weighs its flash, compares its errors, and hashes its answers on all machines.
+    /// libm; weighs its flash, compares its errors, and hashes its answers on all machines. Then the
+    /// instructions that each kind of frame costs the CANopen node, its flash and its RAM.
     Cycles {
         /// Prints JSON.
         #[arg(long)]
         json: bool,
-        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %, or when spread,
-        /// flash, or the distance to f32 miss their bound.
+        /// Fails when a median exceeds firmware/kinematics/budget.json by more than 2 %, when spread,
+        /// flash, or the distance to f32 miss their bound, or the node firmware/canopen/budget.json.
         #[arg(long)]
         check: bool,
+        /// Measures the CANopen node alone.
+        #[arg(long)]
+        node: bool,
     },
 }
 
@@ -101,12 +122,23 @@ fn main() -> ExitCode {
             Ok(status) => return ExitCode::from(status),
             Err(error) => Err(error),
         },
+        Task::Fuzz {
+            target,
+            reproduce: Some(input),
+            ..
+        } => fuzz::reproduce(target.as_deref(), &input),
+        Task::Fuzz {
+            target,
+            seconds,
+            minimise,
+            reproduce: None,
+        } => fuzz::run_targets(target.as_deref(), seconds, minimise),
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
         Task::Exhaustive => exhaustive::check(),
         Task::Proofs => proofs::run(),
-        Task::Cycles { json, check } => cycles::run(json, check),
+        Task::Cycles { json, check, node } => cycles::run(json, check, node),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

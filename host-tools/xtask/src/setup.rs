@@ -18,7 +18,7 @@ struct Tool {
 }
 
 /// What the tests need beyond cargo and the cross compiler.
-const TOOLS: [Tool; 9] = [
+const TOOLS: [Tool; 10] = [
     Tool {
         purpose: "running images",
         witness: "qemu-system-arm",
@@ -28,6 +28,11 @@ const TOOLS: [Tool; 9] = [
         purpose: "proofs of the kernel",
         witness: "gappa",
         package: "gappa",
+    },
+    Tool {
+        purpose: "libFuzzer",
+        witness: "c++",
+        package: "g++",
     },
     Tool {
         purpose: "a vcan0",
@@ -197,7 +202,12 @@ fn apt() -> std::process::Command {
 
 /// Returns the Python of the tests' environment.
 pub fn python() -> PathBuf {
-    clean_root().join("target/venv/bin/python")
+    venv().join("bin/python")
+}
+
+/// Returns the folder of the tests' environment, which has cargo-fuzz too.
+pub fn venv() -> PathBuf {
+    clean_root().join("target/venv")
 }
 
 /// Makes the Python environment that tests/python/requirements.txt asks for.

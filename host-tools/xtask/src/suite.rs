@@ -7,7 +7,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, exhaustive, firmware, generated, panics, proofs, setup, vcan};
+use crate::{cycles, exhaustive, firmware, fuzz, generated, panics, proofs, setup, vcan};
+
+/// How long each fuzz target looks for new inputs.
+pub const FUZZ_SECONDS: u64 = 60;
+/// How many random and bent frames a node must live through.
+const ANY_FRAMES: &str = "10000000";
 
 /// One step: its name, and whether a fast run has it.
 struct Step {
@@ -16,7 +21,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 13] = [
+const STEPS: [Step; 15] = [
     Step {
         name: "tools",
         in_fast: false,
@@ -43,9 +48,9 @@ const STEPS: [Step; 13] = [
         run: panics::check,
     },
     Step {
-        name: "the kernel's budgets",
+        name: "budgets of kernel and node",
         in_fast: false,
-        run: || cycles::run(false, true),
+        run: || cycles::run(false, true, false),
     },
     Step {
         name: "proofs",
@@ -61,6 +66,16 @@ const STEPS: [Step; 13] = [
         name: "every input of primitives",
         in_fast: false,
         run: exhaustive::check,
+    },
+    Step {
+        name: "ten million frames",
+        in_fast: false,
+        run: run_any_frame,
+    },
+    Step {
+        name: "fuzzing",
+        in_fast: false,
+        run: run_fuzzing,
     },
     Step {
         name: "tests on vcan0",
@@ -148,6 +163,31 @@ fn run_tests() -> Result<()> {
         tests.env("ANGUILLA_PYTHON", setup::python());
     }
     run(&mut tests)
+}
+
+/// Fires ten million frames at a node.
+fn run_any_frame() -> Result<()> {
+    let arguments = [
+        "test",
+        "--release",
+        "-p",
+        "eel-canopen",
+        "--test",
+        "any_frame",
+    ];
+    let words = ["--", "--nocapture"];
+    run(cargo()
+        .args(arguments)
+        .args(words)
+        .env("CANOPEN_FRAMES", ANY_FRAMES))
+}
+
+/// Looks for new inputs that break a promise; `ANGUILLA_FUZZ_SECONDS` says for how long.
+fn run_fuzzing() -> Result<()> {
+    let asked = env::var("ANGUILLA_FUZZ_SECONDS").ok();
+    let seconds = asked.map_or(Ok(FUZZ_SECONDS), |text| text.parse());
+    let seconds = seconds.context("ANGUILLA_FUZZ_SECONDS is no number")?;
+    fuzz::run_targets(None, seconds, false)
 }
 
 /// Runs the tests that need a vcan0 beside one, with the programs that they start.
