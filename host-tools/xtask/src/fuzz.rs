@@ -44,7 +44,7 @@ const TARGETS: [Target; 5] = [
 ];
 
 /// The most bytes that all committed inputs may take together.
-const MOST_COMMITTED: u64 = 400_000;
+const MOST_COMMITTED: u64 = 500_000;
 /// Lines of a failed run that are shown.
 const SHOWN: usize = 30;
 

@@ -5,7 +5,7 @@ use eel_canopen::{
 };
 
 use crate::application::Objects;
-use crate::oracle::Allowed;
+use crate::oracle::{Allowed, is_reserved};
 
 /// The node id of a node that has one.
 pub const ID: u8 = 5;
@@ -293,6 +293,7 @@ impl Bench {
             .into_iter()
             .filter_map(|(index, sub)| ask(index, sub))
         {
+            assert!(!is_reserved(cob_id), "{cob_id:03X} belongs to others");
             if !self.allowed.cob_ids.contains(&cob_id) {
                 self.allowed.cob_ids.push(cob_id);
             }

@@ -1,6 +1,8 @@
 //! An SDO client on a line that loses, repeats and bends frames, by CiA 301, 7.2.4.3, without a look at
 //! the server.
 
+use std::collections::VecDeque;
+
 use eel_canopen::Frame;
 
 use crate::bench::{Bench, ID};
@@ -48,6 +50,13 @@ pub enum Fate {
     Bent(u8),
 }
 
+/// Who sends a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Client,
+    Server,
+}
+
 /// The transfer did not succeed, which it may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Failed;
@@ -62,7 +71,11 @@ pub struct Client<'a> {
     /// How many bytes of a frame may be bent now: of what names the object none, for nothing protects it;
     /// of a segment only the command, unless a CRC protects the data.
     bendable: usize,
-    answers: std::collections::VecDeque<[u8; 8]>,
+    answers: VecDeque<[u8; 8]>,
+    /// Who sends segments of a block now, which a block transfer sends again.
+    in_block: Option<Side>,
+    /// Whether anything else was lost.
+    lost_for_good: bool,
 }
 
 impl<'a> Client<'a> {
@@ -72,7 +85,9 @@ impl<'a> Client<'a> {
             fates,
             bent: false,
             bendable: 0,
-            answers: std::collections::VecDeque::new(),
+            answers: VecDeque::new(),
+            in_block: None,
+            lost_for_good: false,
         }
     }
 
@@ -99,6 +114,11 @@ impl<'a> Client<'a> {
             _ => self.upload_segments(object),
         };
         done.inspect_err(|_| self.abort(object))
+    }
+
+    /// Tells whether something was lost that no block transfer sends again.
+    pub const fn has_lost_for_good(&self) -> bool {
+        self.lost_for_good
     }
 
     fn download_expedited(&mut self, object: (u16, u8), data: &[u8]) -> Result<(), Failed> {
@@ -181,14 +201,21 @@ impl<'a> Client<'a> {
             expect((1..=127).contains(&block) && tries < TRIES)?;
             tries += 1;
             let end = segments.len().min(first + block);
+            let mut lost = 0;
             for (sequence, segment) in (1..).zip(&segments[first..end]) {
                 let last = if first + usize::from(sequence) == segments.len() {
                     0x80
                 } else {
                     0
                 };
+                self.in_block = Some(Side::Client);
+                let is_lost = self.fates.first() == Some(&Fate::Lost);
+                lost += usize::from(is_lost);
                 self.send(filled(last | sequence, segment));
             }
+            self.in_block = None;
+            // Of a block that is lost as a whole the server knows nothing.
+            self.lost_for_good |= lost == end - first;
             let answer = self.answer()?;
             expect(answer[0] == 0xA2 && usize::from(answer[1]) <= end - first)?;
             if answer[1] > 0 {
@@ -221,6 +248,7 @@ impl<'a> Client<'a> {
             expect(tries < TRIES)?;
             tries += 1;
             let mut good = 0;
+            self.in_block = Some(Side::Server);
             // A block ends with its last segment, or with silence.
             while let Some([first, bytes @ ..]) = self.segment() {
                 expect(first != 0x80)?;
@@ -234,6 +262,7 @@ impl<'a> Client<'a> {
                     break;
                 }
             }
+            self.in_block = None;
             self.send([0xA2, good, block, 0, 0, 0, 0, 0]);
         }
         let [end, low, high, ..] = self.answer()?;
@@ -260,7 +289,7 @@ impl<'a> Client<'a> {
 
     fn send(&mut self, request: [u8; 8]) {
         let id = u16::from(ID);
-        for request in self.on_the_line(request) {
+        for request in self.on_the_line(request, Side::Client) {
             let frame = Frame::standard(0x600 + id, &request).expect("eight bytes");
             self.bench.hear(&frame);
             self.collect();
@@ -296,21 +325,24 @@ impl<'a> Client<'a> {
         for frame in self.bench.sent() {
             if frame.cob_id() == Some(0x580 + u16::from(ID)) {
                 let answer = frame.data().try_into().expect("eight bytes");
-                let arrived = self.on_the_line(answer);
+                let arrived = self.on_the_line(answer, Side::Server);
                 self.answers.extend(arrived);
             }
         }
     }
 
     /// Returns what arrives of a frame.
-    fn on_the_line(&mut self, mut frame: [u8; 8]) -> Vec<[u8; 8]> {
+    fn on_the_line(&mut self, mut frame: [u8; 8], from: Side) -> Vec<[u8; 8]> {
         let Some((fate, rest)) = self.fates.split_first() else {
             return vec![frame];
         };
         self.fates = rest;
         match *fate {
             Fate::Arrives => vec![frame],
-            Fate::Lost => Vec::new(),
+            Fate::Lost => {
+                self.lost_for_good |= self.in_block != Some(from);
+                Vec::new()
+            }
             Fate::Twice => vec![frame, frame],
             Fate::Late(micros) => {
                 self.bench.tick(u64::from(micros));

@@ -54,7 +54,7 @@ const OBJECTS: [(u16, u8, u8); 44] = [
 ];
 
 /// What objects that the bus writes are given.
-const VALUES: [u32; 24] = [
+const VALUES: [u32; 32] = [
     0,
     1,
     2,
@@ -79,6 +79,16 @@ const VALUES: [u32; 24] = [
     0x2010_0110,
     0x2010_0340,
     0x0005_0008,
+    // Identifiers that belong to others.
+    0x0581,
+    0x0601,
+    0x4000_0581,
+    0x4000_0701,
+    // More objects and lengths.
+    0x2040_0040,
+    0x2010_0220,
+    0x2000_0410,
+    0x1001_0008,
 ];
 
 /// Draws a frame; `id` is the node's.

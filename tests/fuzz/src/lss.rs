@@ -78,9 +78,10 @@ impl Watched {
         if is_silent || !is_reset {
             assert_eq!(before, self.bench.node.node_id(), "{frame:02X?}");
         }
-        if is_reset && frame.data()[0] == 129 && !is_silent {
+        let is_own = matches!(frame.data(), [_, addressee] if [0, before].contains(addressee));
+        if is_reset && is_own && frame.data()[0] == 129 && !is_silent {
             // A reset of the node ends the configuration; of the communication does not.
-            self.configuring &= sent.is_empty();
+            self.configuring = false;
         }
     }
 

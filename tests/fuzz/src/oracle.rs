@@ -96,6 +96,14 @@ impl Allowed {
     }
 }
 
+/// Tells whether CiA 301, table 41, keeps an identifier for NMT, SDO, heartbeats, LSS or what is to come.
+pub const fn is_reserved(cob_id: u16) -> bool {
+    matches!(
+        cob_id,
+        0x000..=0x07F | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..
+    )
+}
+
 /// Tells whether these bytes are an answer of an LSS slave.
 fn is_lss(data: &[u8]) -> bool {
     let &[command, a, b, c, d, e, f, g] = data else {

@@ -2,7 +2,7 @@
 //! starts with whatever its flash holds.
 
 use eel_canopen::{Frame, NmtState, STORED_PARAMETERS};
-use eel_protocol::NodeId;
+use eel_protocol::{NodeId, dictionary};
 use eel_units::Instant;
 use eel_vertebra::store::{RAM_PAGE, RamFlash, Store, Stored, serve};
 use eel_vertebra::{Settings, Vertebra};
@@ -10,6 +10,27 @@ use eel_vertebra::{Settings, Vertebra};
 use crate::bench::{Bench, ID, config};
 use crate::input::Input;
 
+/// The layout of stored parameters: the bytes before the PDOs, of an RPDO, and of a TPDO.
+const HEAD: usize = 21;
+const RPDO: usize = 36;
+const TPDO: usize = 41;
+/// Entries of mappings, right and wrong.
+const MAPPED: [u32; 14] = [
+    0,
+    0x2000_0110,
+    0x2000_0408,
+    0x2002_0108,
+    0x2010_0110,
+    0x2010_0220,
+    0x2010_0340,
+    0x2040_0040,
+    0x1001_0008,
+    0x0005_0008,
+    0x0007_0020,
+    0x2010_0108,
+    0x2020_0008,
+    0x2100_0108,
+];
 /// The most bytes that are bent.
 const BENT: usize = 64;
 
@@ -82,12 +103,24 @@ fn check_mappings(bench: &mut Bench) {
     }
 }
 
-/// Bends parameters that are right.
+/// Bends parameters that are right: any byte, or a PDO's count and objects.
 fn bent_parameters(input: &mut Input<'_>) -> Vec<u8> {
     let mut stored = save(&Bench::new(ID, &[]));
+    let receive = config(ID).rpdos.len();
+    let transmit = config(ID).tpdos.len();
     for _ in 0..input.below(BENT) {
-        let at = usize::from(input.word()) % stored.len();
-        stored[at] = input.byte();
+        if input.byte() & 1 == 0 {
+            let at = usize::from(input.word()) % stored.len();
+            stored[at] = input.byte();
+            continue;
+        }
+        // Behind the head: identifier, type, count, entries; a TPDO has five bytes more.
+        let pdo = input.below(receive + transmit);
+        let at = HEAD + pdo * RPDO + pdo.saturating_sub(receive) * (TPDO - RPDO);
+        let entry = input.below(8);
+        stored[at + 3] = input.byte() % 10;
+        let mapped: u32 = input.pick(&MAPPED);
+        stored[at + 4 + 4 * entry..][..4].copy_from_slice(&mapped.to_le_bytes());
     }
     stored
 }
@@ -184,8 +217,8 @@ fn check_vertebra(vertebra: &mut Vertebra) {
     let boot_up = Frame::standard(0x700 + u16::from(id.get()), &[0]);
     assert_eq!(vertebra.poll_transmit(), boot_up);
     while vertebra.poll_transmit().is_some() {}
-    for (index, subindex) in eel_protocol::dictionary::settings() {
-        let (object, sub) = eel_protocol::dictionary::find(index, subindex).expect("a setting");
+    for (index, subindex) in dictionary::settings() {
+        let (object, sub) = dictionary::find(index, subindex).expect("an entry");
         let [low, high] = object.index.to_le_bytes();
         let request = [0x40, low, high, sub.subindex, 0, 0, 0, 0];
         let frame = Frame::standard(0x600 + u16::from(id.get()), &request);
