@@ -71,9 +71,8 @@ fn run() -> Result<(), Failure> {
             }
             (Kind::Input, Some(vertebra)) => {
                 let given = lockstep::Input::decode(body)?;
-                let now = given.now;
-                let made = meter.count(|| answer(vertebra, given));
-                store::serve(vertebra, &mut store, now);
+                let made = meter.count(|| answer(vertebra, &given));
+                store::serve(vertebra, &mut store, given.now);
                 output.write_all(made.encode().as_bytes())?;
             }
             (Kind::Input, None) | (Kind::Output, _) => return Err(Failure::Order),
@@ -88,7 +87,7 @@ fn run() -> Result<(), Failure> {
 }
 
 /// Does one turn.
-fn answer(vertebra: &mut Vertebra, given: lockstep::Input) -> lockstep::Output {
+fn answer(vertebra: &mut Vertebra, given: &lockstep::Input) -> lockstep::Output {
     let mut frames = Frames::new();
     let lockstep::Input {
         now,
@@ -97,7 +96,7 @@ fn answer(vertebra: &mut Vertebra, given: lockstep::Input) -> lockstep::Output {
         room,
     } = given;
     let heard = heard.iter().copied();
-    let drives = turn(vertebra, now, heard, &sample, room.into(), |frame| {
+    let drives = turn(vertebra, *now, heard, sample, (*room).into(), |frame| {
         // A packet has room for as many as may be asked for.
         let _ = frames.push(frame);
     });

@@ -308,11 +308,15 @@ fn a_running_vertebra_lets_go_when_the_head_falls_silent_and_knows_when() {
         .expect("a host that does not stand still");
     let (off, ready, run, stop_damped, stop_brake) = (1, 2, 3, 7, 8);
     assert_eq!(found["running"], json!([off, ready, run]));
-    assert_eq!(
-        found["emergencies"],
-        json!(["30817f0000"]),
-        "8130, the node is 127"
-    );
+    // A host that stands still for less is told of late targets, and that they are back.
+    let emergencies = found["emergencies"].as_array().unwrap().iter();
+    let is_late = |it: &&Value| {
+        ["\"10ff", "\"0000"]
+            .iter()
+            .any(|code| it.to_string().starts_with(code))
+    };
+    let faults: Vec<&Value> = emergencies.filter(|it| !is_late(it)).collect();
+    assert_eq!(faults, ["30817f0000"], "8130, the node is 127");
     assert_eq!(found["let go"], json!([run, stop_damped, stop_brake]));
     assert_eq!(found["again"], json!([stop_brake, off, ready, run]));
     let freeze = &found["freeze"];

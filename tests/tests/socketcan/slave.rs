@@ -57,7 +57,12 @@ fn the_head_leads_a_slave_of_durand() {
         (&json!(0), &json!(0))
     );
     let number = |name: &str| told[name].as_u64().unwrap();
-    assert_eq!(told["syncs"], last["sync_sent"], "it hears every SYNC");
+    // It hears every SYNC until its end, which the last one may follow.
+    let sent = last["sync_sent"].as_u64().unwrap();
+    assert!(
+        (sent - 1..=sent).contains(&number("syncs")),
+        "{told} {sent}"
+    );
     // A target with every SYNC from the start of the node to its end.
     assert!(
         number("targets") > 300 && number("targets") <= number("syncs"),
