@@ -307,7 +307,10 @@ fn a_running_vertebra_lets_go_when_the_head_falls_silent_and_knows_when() {
         .find(|found| !lost_targets(found))
         .expect("a host that does not stand still");
     let (off, ready, run, stop_damped, stop_brake) = (1, 2, 3, 7, 8);
-    assert_eq!(found["running"], json!([off, ready, run]));
+    // Off is over before the first report where the host was slow.
+    let running = &found["running"];
+    let ways = [json!([off, ready, run]), json!([ready, run])];
+    assert!(ways.contains(running), "{running}");
     // A host that stands still for less is told of late targets, and that they are back.
     let emergencies = found["emergencies"].as_array().unwrap().iter();
     let is_late = |it: &&Value| {
