@@ -69,13 +69,4 @@ impl Communication {
         self.error_behaviour = behaviour;
         Ok(())
     }
-
-    /// Returns when the earliest of the timers that always run ends.
-    pub fn deadline_us(&self) -> Option<u64> {
-        let producer = self.producer.deadline_us();
-        producer
-            .into_iter()
-            .chain(self.consumer.deadline_us())
-            .min()
-    }
 }

@@ -186,11 +186,6 @@ impl Emergency {
         !self.waiting.is_empty()
     }
 
-    /// Returns when the next message may be sent, if one waits.
-    pub fn deadline_us(&self) -> Option<u64> {
-        (!self.waiting.is_empty()).then_some(self.quiet_until_us)
-    }
-
     /// Takes the next message that may be sent now.
     pub fn next(&mut self, now_us: u64) -> Option<[u8; 8]> {
         if now_us < self.quiet_until_us {

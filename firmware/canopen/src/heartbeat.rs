@@ -28,7 +28,7 @@ impl Producer {
         };
     }
 
-    pub fn deadline_us(&self) -> Option<u64> {
+    fn deadline_us(&self) -> Option<u64> {
         (self.period_ms > 0).then_some(self.due_us)
     }
 
@@ -122,7 +122,7 @@ impl Consumer {
         Heard { back, changed }
     }
 
-    pub fn deadline_us(&self) -> Option<u64> {
+    fn deadline_us(&self) -> Option<u64> {
         match self.state {
             Watch::Alive { deadline_us } => Some(deadline_us),
             Watch::Waiting | Watch::Lost => None,

@@ -45,9 +45,8 @@ pub struct Counters {
 /// A CANopen slave: one node id on one bus.
 ///
 /// Its owner gives it every frame of the bus and calls [`tick`](Self::tick) once per millisecond or
-/// so, or at [`next_deadline_us`](Self::next_deadline_us); then it drains
-/// [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event). Time is in
-/// microseconds from any start and never goes back.
+/// so; then it drains [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event).
+/// Time is in microseconds from any start and never goes back.
 #[derive(Clone, Debug)]
 pub struct Node {
     config: Config,
@@ -163,31 +162,6 @@ impl Node {
         }
         self.stream(now_us, app);
         self.settle(now_us, app);
-    }
-
-    /// Returns the time at which [`tick`](Self::tick) has something to do; `None` when only a
-    /// frame can give the node work. It is past while segments of an SDO block upload find room.
-    #[inline(never)] // One copy in flash, and a small one.
-    pub fn next_deadline_us(&self) -> Option<u64> {
-        if self.state == NmtState::Initialising {
-            return None;
-        }
-        let mut deadline = earlier(self.communication.deadline_us(), self.sdo.deadline_us());
-        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting {
-            deadline = earlier(deadline, Some(deadline_us));
-        }
-        if self.sdo.has_segment() && self.transmit.has_sdo_room() {
-            deadline = Some(0);
-        }
-        if self.state != NmtState::Stopped {
-            deadline = earlier(deadline, self.communication.emergency.deadline_us());
-        }
-        if self.state == NmtState::Operational {
-            for tpdo in &self.communication.tpdos {
-                deadline = earlier(deadline, tpdo.deadline_us());
-            }
-        }
-        deadline
     }
 
     /// Takes the next frame to send.
@@ -502,11 +476,4 @@ fn sdo_cob_id(node_id: u8) -> u16 {
 
 fn heartbeat_cob_id(node_id: u8) -> u16 {
     0x700 + u16::from(node_id)
-}
-
-fn earlier(a: Option<u64>, b: Option<u64>) -> Option<u64> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    }
 }

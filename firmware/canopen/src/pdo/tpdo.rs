@@ -84,7 +84,7 @@ impl Tpdo {
     }
 
     /// Returns when an event-driven PDO must be looked at again.
-    pub fn deadline_us(&self) -> Option<u64> {
+    fn deadline_us(&self) -> Option<u64> {
         if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
             return None;
         }

@@ -72,7 +72,7 @@ impl Server {
     }
 
     /// Returns when time alone changes a running transfer.
-    pub fn deadline_us(&self) -> Option<u64> {
+    fn deadline_us(&self) -> Option<u64> {
         match &self.transfer {
             Transfer::Idle => None,
             Transfer::Upload(_) => Some(self.deadline_us),
@@ -115,11 +115,6 @@ impl Server {
     /// Tells whether segments of an upload may be on their way.
     pub fn is_streaming(&self) -> bool {
         matches!(&self.transfer, Transfer::Upload(upload) if upload.is_streaming())
-    }
-
-    /// Tells whether [`segment`](Self::segment) has one.
-    pub fn has_segment(&self) -> bool {
-        matches!(&self.transfer, Transfer::Upload(upload) if upload.has_segment())
     }
 
     /// Makes the next segment of a block upload: at most one for each that the client asked for.
