@@ -146,6 +146,7 @@ impl Emergency {
     }
 
     /// Records an error of the node's communication unless it is there already.
+    #[inline(never)] // One copy in flash.
     pub fn raise_fault(&mut self, fault: Fault, detail: u8) {
         if self.faults & fault.bit() == 0 {
             self.faults |= fault.bit();
@@ -154,6 +155,7 @@ impl Emergency {
     }
 
     /// Takes back an error of the node's communication if it is there.
+    #[inline(never)] // One copy in flash.
     pub fn clear_fault(&mut self, fault: Fault) {
         if self.faults & fault.bit() != 0 {
             self.faults &= !fault.bit();

@@ -188,14 +188,18 @@ pub(crate) fn load(
 
 /// Tells whether every mapped object exists and may go where it is mapped to.
 pub(crate) fn is_served(communication: &Communication, app: &dyn Application) -> bool {
-    let rpdos = communication.rpdos.iter().map(|rpdo| &rpdo.parameters);
-    let tpdos = communication.tpdos.iter().map(|tpdo| &tpdo.parameters);
-    rpdos.chain(tpdos).all(|parameters| {
-        let mut entries = parameters.entries().iter();
-        entries.all(|mapped| {
-            let described = describe(*mapped, app);
-            parameters.check_entry(*mapped, described).is_ok()
-        })
+    let mut rpdos = communication.rpdos.iter();
+    let mut tpdos = communication.tpdos.iter();
+    rpdos.all(|rpdo| is_mapping_served(&rpdo.parameters, app))
+        && tpdos.all(|tpdo| is_mapping_served(&tpdo.parameters, app))
+}
+
+#[inline(never)] // One copy in flash.
+fn is_mapping_served(parameters: &Parameters, app: &dyn Application) -> bool {
+    let mut entries = parameters.entries().iter();
+    entries.all(|mapped| {
+        let described = describe(*mapped, app);
+        parameters.check_entry(*mapped, described).is_ok()
     })
 }
 

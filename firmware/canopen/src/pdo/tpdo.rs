@@ -61,10 +61,13 @@ impl Tpdo {
     }
 
     /// Counts a SYNC and tells whether the PDO is due with it.
+    #[inline]
     pub fn is_due_at_sync(&mut self, counter: Option<u8>) -> bool {
-        if !self.parameters.is_enabled() {
-            return false;
-        }
+        self.parameters.is_enabled() && self.count_sync(counter)
+    }
+
+    #[inline(never)] // One copy in flash.
+    fn count_sync(&mut self, counter: Option<u8>) -> bool {
         match self.parameters.transmission() {
             0 => core::mem::take(&mut self.requested),
             period @ 1..=240 => {
