@@ -6,6 +6,7 @@
 use heapless::Deque;
 
 use crate::cob_id::{self, FRAME_BIT, INVALID_BIT};
+use crate::deadline::after;
 use crate::{Abort, Config, NmtCommand};
 
 /// The most messages that wait for the inhibit time, or for the node to leave Stopped.
@@ -194,7 +195,7 @@ impl Emergency {
             return None;
         }
         let message = self.waiting.pop_front()?;
-        self.quiet_until_us = now_us.saturating_add(u64::from(self.inhibit_100us) * 100);
+        self.quiet_until_us = after(now_us, u32::from(self.inhibit_100us) * 100);
         Some(message)
     }
 

@@ -62,6 +62,8 @@ pub struct Node {
     /// What is being stored, and who waits for it.
     storing: Option<StoreRequest>,
     waiting: Option<Waiting>,
+    /// When an SDO client has waited for too long.
+    waiting_until_us: u64,
     transmit: TransmitQueue,
     events: EventQueue<Event, EVENTS>,
     rpdos_short: u32,
@@ -72,8 +74,8 @@ pub struct Node {
 /// Who waits for something to be stored.
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
-    /// The SDO client, which gets this answer once it is done and never later than `deadline_us`.
-    Sdo { answer: [u8; 8], deadline_us: u64 },
+    /// The SDO client, which gets this answer once it is done.
+    Sdo([u8; 8]),
     /// The LSS master.
     Lss,
 }
@@ -107,6 +109,7 @@ impl Node {
             stored_refused: false,
             storing: None,
             waiting: None,
+            waiting_until_us: 0,
             transmit: TransmitQueue::default(),
             events: EventQueue::default(),
             rpdos_short: 0,

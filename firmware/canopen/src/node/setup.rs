@@ -3,12 +3,13 @@
 use heapless::Vec;
 
 use super::{Node, Waiting};
+use crate::deadline::after;
 use crate::lss::{self, Outcome};
 use crate::stored;
 use crate::{Abort, Application, Event, NmtCommand, NmtState, STORED_PARAMETERS, StoreRequest};
 
 /// How long a client waits for something to be stored.
-const STORE_TIMEOUT_US: u64 = 1_000_000;
+const STORE_TIMEOUT_US: u32 = 1_000_000;
 
 impl Node {
     /// Writes the parameters of the communication area to the start of `out` and returns how many
@@ -44,7 +45,7 @@ impl Node {
             }
         }
         match self.waiting.take() {
-            Some(Waiting::Sdo { answer, .. }) => {
+            Some(Waiting::Sdo(answer)) => {
                 let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
                 self.answer(answer);
             }
@@ -55,10 +56,8 @@ impl Node {
 
     /// Has an SDO client wait for what it asked to be stored.
     pub(super) fn wait_for_store(&mut self, now_us: u64, answer: [u8; 8]) {
-        self.waiting = Some(Waiting::Sdo {
-            answer,
-            deadline_us: now_us.saturating_add(STORE_TIMEOUT_US),
-        });
+        self.waiting = Some(Waiting::Sdo(answer));
+        self.waiting_until_us = after(now_us, STORE_TIMEOUT_US);
         if let Some(request) = self.storing {
             self.events.push(Event::Store(request));
         }
@@ -66,9 +65,7 @@ impl Node {
 
     /// Tells an SDO client that storing takes too long.
     pub(super) fn expire_store(&mut self, now_us: u64) {
-        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting
-            && now_us >= deadline_us
-        {
+        if matches!(self.waiting, Some(Waiting::Sdo(_))) && now_us >= self.waiting_until_us {
             self.waiting = None;
             self.answer(refusal(self.storing, Abort::Hardware));
         }

@@ -1,7 +1,7 @@
 //! A transmit PDO: when it is due.
 
 use super::{Direction, Parameters};
-use crate::heartbeat::micros;
+use crate::deadline::{after, micros};
 use crate::{Abort, PdoDefault};
 
 /// A transmit PDO.
@@ -52,7 +52,7 @@ impl Tpdo {
         self.awaits_start = self.sync_start != 0;
         self.requested = false;
         self.inhibited_until_us = now_us;
-        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+        self.event_due_us = after(now_us, micros(self.event_ms));
     }
 
     /// Asks for one transmission.
@@ -86,29 +86,19 @@ impl Tpdo {
         }
     }
 
-    /// Returns when an event-driven PDO must be looked at again.
-    fn deadline_us(&self) -> Option<u64> {
-        if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
-            return None;
-        }
-        if self.requested {
-            return Some(self.inhibited_until_us);
-        }
-        (self.event_ms > 0).then(|| self.event_due_us.max(self.inhibited_until_us))
-    }
-
     /// Tells whether an event-driven PDO is due, and counts it as sent.
     #[inline(never)] // One copy in flash.
     pub fn is_due_at(&mut self, now_us: u64) -> bool {
-        if self
-            .deadline_us()
-            .is_none_or(|deadline_us| now_us < deadline_us)
-        {
+        if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
+            return false;
+        }
+        let is_wanted = self.requested || self.event_ms > 0 && now_us >= self.event_due_us;
+        if !is_wanted || now_us < self.inhibited_until_us {
             return false;
         }
         self.requested = false;
-        self.inhibited_until_us = now_us.saturating_add(u64::from(self.inhibit_100us) * 100);
-        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+        self.inhibited_until_us = after(now_us, u32::from(self.inhibit_100us) * 100);
+        self.event_due_us = after(now_us, micros(self.event_ms));
         true
     }
 

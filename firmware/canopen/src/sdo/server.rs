@@ -4,11 +4,12 @@ use super::block::{Block, Heard};
 use super::download::Download;
 use super::upload::{Upload, check_block_size};
 use super::{BLOCK, Buffer, Message, Multiplexor, SDO_BUFFER, message};
+use crate::deadline::after;
 use crate::objects::Objects;
 use crate::{Abort, Application};
 
 /// Silence of the client after which a transfer is aborted.
-const TIMEOUT_US: u64 = 1_000_000;
+const TIMEOUT_US: u32 = 1_000_000;
 /// The command of an abort, in both directions.
 const ABORT: u8 = 0x80;
 
@@ -71,32 +72,15 @@ impl Server {
         }
     }
 
-    /// Returns when time alone changes a running transfer.
-    fn deadline_us(&self) -> Option<u64> {
-        match &self.transfer {
-            Transfer::Idle => None,
-            Transfer::Upload(_) => Some(self.deadline_us),
-            Transfer::Download(download) => {
-                let quiet_us = download.block.as_ref().and_then(Block::quiet_us);
-                Some(quiet_us.map_or(self.deadline_us, |us| us.min(self.deadline_us)))
-            }
-        }
-    }
-
     /// Ends a transfer whose client fell silent, or tells the client what is missing: the message
     /// to send about it.
     pub fn expire(&mut self, now_us: u64) -> Option<Message> {
-        let deadline_us = self.deadline_us()?;
-        if now_us < deadline_us {
-            return None;
-        }
-        let mut good = Err(Abort::Timeout);
-        if now_us < self.deadline_us
-            && let Transfer::Download(download) = &mut self.transfer
-            && let Some(block) = &mut download.block
-        {
-            good = block.expire(now_us);
-        }
+        let good = match &mut self.transfer {
+            Transfer::Idle => return None,
+            _ if now_us >= self.deadline_us => Err(Abort::Timeout),
+            Transfer::Upload(_) => return None,
+            Transfer::Download(download) => download.block.as_mut()?.expire(now_us),
+        };
         match good {
             Ok(good) => good.map(acknowledgement),
             Err(abort) => Some(self.abort(abort)),
@@ -125,7 +109,7 @@ impl Server {
         if !upload.has_segment() {
             return None;
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         let segment = upload.next(&mut self.buffer, objects);
         Some(segment.unwrap_or_else(|abort| self.abort(abort)))
     }
@@ -139,7 +123,7 @@ impl Server {
         {
             return self.block_segment(request, objects);
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         match (command >> 5, command & 3) {
             (0, _) => self.download_segment(request, objects),
             (1, _) => self.start_download(request, objects),
@@ -335,7 +319,7 @@ impl Server {
             Heard::Forward => {}
             Heard::Acknowledge(good) => self.answer = Some(acknowledgement(good)),
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         Ok(())
     }
 
