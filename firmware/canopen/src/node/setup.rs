@@ -49,7 +49,7 @@ impl Node {
                 let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
                 self.answer(answer);
             }
-            Some(Waiting::Lss) => self.answer_lss(&lss::stored(outcome.is_ok())),
+            Some(Waiting::Lss) => self.answer_lss(lss::stored(outcome.is_ok())),
             None => {}
         }
     }
@@ -123,10 +123,9 @@ impl Node {
             .lss
             .request(request, &config.identity, config.node_id, config.node_ids);
         match outcome {
-            Outcome::Silence => {}
-            Outcome::Answer(answer) => self.answer_lss(&answer),
+            Outcome::Silence | Outcome::Answer(..) => self.answer_lss(outcome),
             Outcome::Store if self.storing.is_some() || app.may_configure().is_err() => {
-                self.answer_lss(&lss::stored(false));
+                self.answer_lss(lss::stored(false));
             }
             Outcome::Store => {
                 let request = StoreRequest::NodeId(self.lss.pending());
@@ -155,8 +154,12 @@ impl Node {
         self.events.push(Event::Nmt { command, state });
     }
 
-    fn answer_lss(&mut self, answer: &[u8; 8]) {
-        self.transmit.push(lss::ANSWER, *answer, 8);
+    fn answer_lss(&mut self, outcome: Outcome) {
+        if let Outcome::Answer(command, data) = outcome {
+            let [a, b, c, d] = data.to_le_bytes();
+            let answer = [command, a, b, c, d, 0, 0, 0];
+            self.transmit.push(lss::ANSWER, answer, 8);
+        }
     }
 }
 
