@@ -32,7 +32,7 @@ impl Communication {
             error_behaviour: 0,
             rpdos: [Rpdo::absent(); PDOS],
             tpdos: [Tpdo::absent(); PDOS],
-            emergency: Emergency::new(config),
+            emergency: Emergency::new(),
         };
         communication.reset(NmtCommand::ResetNode, config, now_us);
         communication
@@ -55,7 +55,7 @@ impl Communication {
         for (place, tpdo) in self.tpdos.iter_mut().enumerate() {
             tpdo.reset(config.tpdos.get(place), node_id);
         }
-        self.emergency.reset(command, config);
+        self.emergency.reset(command, node_id);
     }
 
     /// Writes object 0x1029, subindex 1.
