@@ -30,8 +30,8 @@ impl Communication {
             sync: Sync::new(0, 0),
             time: Time::new(0),
             error_behaviour: 0,
-            rpdos: [Rpdo::absent(); PDOS],
-            tpdos: [Tpdo::absent(); PDOS],
+            rpdos: [const { Rpdo::absent() }; PDOS],
+            tpdos: [const { Tpdo::absent() }; PDOS],
             emergency: Emergency::new(),
         };
         communication.reset(NmtCommand::ResetNode, config, now_us);

@@ -160,8 +160,15 @@ impl Emergency {
     }
 
     /// Takes back an error of the node's communication if it is there.
-    #[inline(never)] // One copy in flash.
+    #[inline]
     pub fn clear_fault(&mut self, fault: Fault) {
+        if self.faults != 0 {
+            self.end_fault(fault);
+        }
+    }
+
+    #[inline(never)] // One copy in flash.
+    fn end_fault(&mut self, fault: Fault) {
         if self.faults & fault.bit() != 0 {
             self.faults &= !fault.bit();
             self.send(0, [0; 5]);

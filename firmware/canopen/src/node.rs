@@ -105,7 +105,7 @@ impl Node {
             sdo: Server::new(),
             lss: Lss::new(config.node_id),
             stored_id: config.node_id,
-            stored: Vec::from_slice(stored).unwrap_or_default(),
+            stored: Vec::new(),
             stored_refused: false,
             storing: None,
             waiting: None,
@@ -116,6 +116,8 @@ impl Node {
             rpdos_refused: 0,
             tpdos_refused: 0,
         };
+        // None of them where they are too many.
+        let _ = node.stored.extend_from_slice(stored);
         node.load(now_us);
         if node.stored.len() != stored.len() || !stored::is_served(&node.communication, app) {
             node.stored.clear();
@@ -373,12 +375,16 @@ impl Node {
                 .raise_fault(Fault::Heartbeat, node);
             self.behave_after_error(now_us);
         }
-        let streaming = self.sdo.is_streaming();
-        if let Some(message) = self.sdo.expire(now_us) {
-            self.withdraw(streaming);
-            self.answer(message);
+        if !self.sdo.is_idle() {
+            let streaming = self.sdo.is_streaming();
+            if let Some(message) = self.sdo.expire(now_us) {
+                self.withdraw(streaming);
+                self.answer(message);
+            }
         }
-        self.expire_store(now_us);
+        if self.waiting.is_some() {
+            self.expire_store(now_us);
+        }
     }
 
     fn hear(&mut self, now_us: u64, data: &[u8]) {

@@ -1,7 +1,5 @@
 //! What outlives a reset: node id, stored parameters, and who asks for them to be stored.
 
-use heapless::Vec;
-
 use super::{Node, Waiting};
 use crate::deadline::after;
 use crate::lss::{self, Outcome};
@@ -73,9 +71,10 @@ impl Node {
 
     /// Takes the parameters as they are for those after the next reset.
     fn keep(&mut self) {
-        let mut bytes = [0; STORED_PARAMETERS];
-        let length = self.save_parameters(&mut bytes).unwrap_or(0);
-        self.stored = Vec::from_slice(bytes.get(..length).unwrap_or(&[])).unwrap_or_default();
+        // As long as it can be, so that they fit, and then as long as they are.
+        let _ = self.stored.resize_default(STORED_PARAMETERS);
+        let length = stored::save(&self.communication, &self.config, &mut self.stored);
+        self.stored.truncate(length.unwrap_or(0));
     }
 
     /// Starts the node anew.
@@ -164,6 +163,7 @@ impl Node {
 }
 
 /// Returns the SDO message that refuses what was asked for.
+#[inline(never)] // One copy in flash.
 fn refusal(request: Option<StoreRequest>, abort: Abort) -> [u8; 8] {
     let (low, group) = match request {
         Some(StoreRequest::Save(group)) => (0x10, group as u8),

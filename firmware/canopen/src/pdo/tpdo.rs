@@ -23,7 +23,7 @@ pub(crate) struct Tpdo {
 impl Tpdo {
     pub const fn absent() -> Self {
         Self {
-            parameters: Parameters::absent(Direction::Transmit),
+            parameters: Parameters::absent(),
             inhibit_100us: 0,
             event_ms: 0,
             sync_start: 0,
@@ -38,7 +38,7 @@ impl Tpdo {
     /// Returns to the default for node `node_id`, if the node has the PDO.
     pub fn reset(&mut self, default: Option<&PdoDefault>, node_id: u8) {
         if let Some(default) = default {
-            self.parameters.reset(default, node_id);
+            self.parameters.reset(Direction::Transmit, default, node_id);
         }
         self.inhibit_100us = 0;
         self.event_ms = 0;
@@ -47,6 +47,7 @@ impl Tpdo {
     }
 
     /// Begins to count SYNCs and time: the node entered Operational, or the PDO was changed.
+    #[inline(never)] // One copy in flash.
     pub fn restart(&mut self, now_us: u64) {
         self.countdown = self.parameters.transmission();
         self.awaits_start = self.sync_start != 0;

@@ -139,6 +139,7 @@ impl Block {
         self.held.take_if(|_| self.at_end)
     }
 
+    #[inline(never)] // One copy in flash.
     fn acknowledge(&mut self) -> Result<u8, Abort> {
         if let Some(abort) = self.failure {
             return Err(abort);
