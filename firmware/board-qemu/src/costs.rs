@@ -205,8 +205,4 @@ fn time(stopwatch: &Stopwatch) {
     tell("tick_two_tpdos_and_segments", bench.tick(500_000));
     check("segments", bench.is_answered(4));
     tell("tick_nothing", bench.tick(0));
-    let ticks = bench.time(|node, _, _| {
-        core::hint::black_box(node.next_deadline_us());
-    });
-    tell("call_next_deadline", ticks);
 }

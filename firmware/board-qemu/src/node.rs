@@ -38,7 +38,6 @@ mod image {
             node.handle_frame(now_us, &frame, app);
         }
         node.tick(now_us, app);
-        black_box(node.next_deadline_us());
         while let Some(frame) = node.poll_transmit() {
             black_box(frame);
         }

@@ -16,6 +16,7 @@ pub(crate) const FRAME_BIT: u32 = 1 << 29;
 /// # Errors
 /// [`Abort::Value`] for an extended identifier and for one that CiA 301 keeps for NMT, SDO,
 /// heartbeats and LSS (table 41).
+#[inline(never)] // One copy in flash.
 pub(crate) const fn parse(raw: u32) -> Result<u16, Abort> {
     let id = raw & !(INVALID_BIT | NO_REMOTE_BIT);
     match id {

@@ -30,9 +30,9 @@ impl Communication {
             sync: Sync::new(0, 0),
             time: Time::new(0),
             error_behaviour: 0,
-            rpdos: [Rpdo::absent(); PDOS],
-            tpdos: [Tpdo::absent(); PDOS],
-            emergency: Emergency::new(config),
+            rpdos: [const { Rpdo::absent() }; PDOS],
+            tpdos: [const { Tpdo::absent() }; PDOS],
+            emergency: Emergency::new(),
         };
         communication.reset(NmtCommand::ResetNode, config, now_us);
         communication
@@ -55,7 +55,7 @@ impl Communication {
         for (place, tpdo) in self.tpdos.iter_mut().enumerate() {
             tpdo.reset(config.tpdos.get(place), node_id);
         }
-        self.emergency.reset(command, config);
+        self.emergency.reset(command, node_id);
     }
 
     /// Writes object 0x1029, subindex 1.
@@ -68,14 +68,5 @@ impl Communication {
         }
         self.error_behaviour = behaviour;
         Ok(())
-    }
-
-    /// Returns when the earliest of the timers that always run ends.
-    pub fn deadline_us(&self) -> Option<u64> {
-        let producer = self.producer.deadline_us();
-        producer
-            .into_iter()
-            .chain(self.consumer.deadline_us())
-            .min()
     }
 }

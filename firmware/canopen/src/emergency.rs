@@ -6,7 +6,8 @@
 use heapless::Deque;
 
 use crate::cob_id::{self, FRAME_BIT, INVALID_BIT};
-use crate::{Abort, Config, NmtCommand};
+use crate::deadline::after;
+use crate::{Abort, NmtCommand};
 
 /// The most messages that wait for the inhibit time, or for the node to leave Stopped.
 const WAITING: usize = 8;
@@ -48,13 +49,18 @@ impl Fault {
 }
 
 /// The last errors, the newest first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct History {
     errors: [u32; HISTORY as usize],
     length: u8,
 }
 
 impl History {
+    const EMPTY: Self = Self {
+        errors: [0; HISTORY as usize],
+        length: 0,
+    };
+
     /// Records an error; the oldest is forgotten when there is no room.
     fn record(&mut self, error: u32) {
         let mut moved = error;
@@ -80,35 +86,34 @@ pub(crate) struct Emergency {
 }
 
 impl Emergency {
-    pub fn new(config: &Config) -> Self {
+    /// Makes one that [`reset`](Self::reset) must follow.
+    pub const fn new() -> Self {
         Self {
-            cob_id: 0x080 + u16::from(config.node_id),
-            enabled: true,
+            cob_id: 0,
+            enabled: false,
             inhibit_100us: 0,
             quiet_until_us: 0,
             application: 0,
             faults: 0,
             waiting: Deque::new(),
-            history: History::default(),
+            history: History::EMPTY,
             dropped: 0,
         }
     }
 
     /// Starts anew but for the counter and, where only the communication is reset, the
     /// application's errors and the history.
-    pub fn reset(&mut self, command: NmtCommand, config: &Config) {
-        let fresh = Self::new(config);
-        let everything = command == NmtCommand::ResetNode;
-        *self = Self {
-            dropped: self.dropped,
-            application: if everything { 0 } else { self.application },
-            history: if everything {
-                History::default()
-            } else {
-                self.history
-            },
-            ..fresh
-        };
+    pub fn reset(&mut self, command: NmtCommand, node_id: u8) {
+        self.cob_id = 0x080 + u16::from(node_id);
+        self.enabled = true;
+        self.inhibit_100us = 0;
+        self.quiet_until_us = 0;
+        self.faults = 0;
+        self.waiting.clear();
+        if command == NmtCommand::ResetNode {
+            self.application = 0;
+            self.clear_history();
+        }
     }
 
     /// Returns object 0x1001.
@@ -146,6 +151,7 @@ impl Emergency {
     }
 
     /// Records an error of the node's communication unless it is there already.
+    #[inline(never)] // One copy in flash.
     pub fn raise_fault(&mut self, fault: Fault, detail: u8) {
         if self.faults & fault.bit() == 0 {
             self.faults |= fault.bit();
@@ -154,7 +160,15 @@ impl Emergency {
     }
 
     /// Takes back an error of the node's communication if it is there.
+    #[inline]
     pub fn clear_fault(&mut self, fault: Fault) {
+        if self.faults != 0 {
+            self.end_fault(fault);
+        }
+    }
+
+    #[inline(never)] // One copy in flash.
+    fn end_fault(&mut self, fault: Fault) {
         if self.faults & fault.bit() != 0 {
             self.faults &= !fault.bit();
             self.send(0, [0; 5]);
@@ -186,18 +200,13 @@ impl Emergency {
         !self.waiting.is_empty()
     }
 
-    /// Returns when the next message may be sent, if one waits.
-    pub fn deadline_us(&self) -> Option<u64> {
-        (!self.waiting.is_empty()).then_some(self.quiet_until_us)
-    }
-
     /// Takes the next message that may be sent now.
     pub fn next(&mut self, now_us: u64) -> Option<[u8; 8]> {
         if now_us < self.quiet_until_us {
             return None;
         }
         let message = self.waiting.pop_front()?;
-        self.quiet_until_us = now_us.saturating_add(u64::from(self.inhibit_100us) * 100);
+        self.quiet_until_us = after(now_us, u32::from(self.inhibit_100us) * 100);
         Some(message)
     }
 
@@ -223,7 +232,7 @@ impl Emergency {
     }
 
     pub fn clear_history(&mut self) {
-        self.history = History::default();
+        self.history = History::EMPTY;
     }
 
     /// Returns object 0x1014.

@@ -1,5 +1,6 @@
 //! Heartbeats, sent and watched (CiA 301, 7.2.8.3.2, objects 0x1016 and 0x1017).
 
+use crate::deadline::{NEVER_US, after, micros};
 use crate::{Abort, NmtState};
 
 /// Sends the node's state at a fixed period.
@@ -12,7 +13,7 @@ pub(crate) struct Producer {
 impl Producer {
     /// Starts with the boot-up message, which counts as the first heartbeat.
     pub fn new(period_ms: u16, now_us: u64) -> Self {
-        let due_us = now_us.saturating_add(micros(period_ms));
+        let due_us = after(now_us, micros(period_ms));
         Self { period_ms, due_us }
     }
 
@@ -28,22 +29,17 @@ impl Producer {
         };
     }
 
-    pub fn deadline_us(&self) -> Option<u64> {
-        (self.period_ms > 0).then_some(self.due_us)
-    }
-
     /// Tells whether a heartbeat is due and counts it as sent. After a gap the missed ones are not
     /// made up for.
     pub fn is_due(&mut self, now_us: u64) -> bool {
-        if self.deadline_us().is_none_or(|due_us| now_us < due_us) {
+        if self.period_ms == 0 || now_us < self.due_us {
             return false;
         }
-        let next_us = self.due_us.saturating_add(micros(self.period_ms));
-        self.due_us = if next_us > now_us {
-            next_us
-        } else {
-            now_us.saturating_add(micros(self.period_ms))
-        };
+        let period_us = micros(self.period_ms);
+        self.due_us = after(self.due_us, period_us);
+        if self.due_us <= now_us {
+            self.due_us = after(now_us, period_us);
+        }
         true
     }
 }
@@ -62,18 +58,11 @@ pub(crate) struct Heard {
 pub(crate) struct Consumer {
     node: u8,
     timeout_ms: u16,
-    state: Watch,
-    last: Option<NmtState>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Watch {
-    /// Nothing heard yet.
-    Waiting,
-    /// Heard; silence ends at this time.
-    Alive { deadline_us: u64 },
+    /// When silence ends the node's life; never before it was heard.
+    deadline_us: u64,
     /// Silent for too long.
-    Lost,
+    lost: bool,
+    last: Option<NmtState>,
 }
 
 impl Consumer {
@@ -82,7 +71,8 @@ impl Consumer {
         Self {
             node,
             timeout_ms,
-            state: Watch::Waiting,
+            deadline_us: NEVER_US,
+            lost: false,
             last: None,
         }
     }
@@ -108,41 +98,23 @@ impl Consumer {
         (self.timeout_ms > 0 && matches!(self.node, 1..=127)).then_some(self.node)
     }
 
-    pub fn is_lost(&self) -> bool {
-        self.state == Watch::Lost
-    }
-
     pub fn hear(&mut self, byte: u8, now_us: u64) -> Heard {
-        let back = self.is_lost();
-        let deadline_us = now_us.saturating_add(micros(self.timeout_ms));
-        self.state = Watch::Alive { deadline_us };
+        let back = core::mem::take(&mut self.lost);
+        self.deadline_us = after(now_us, micros(self.timeout_ms));
         let state = NmtState::from_heartbeat(byte);
         let changed = state.filter(|_| state != self.last);
         self.last = state;
         Heard { back, changed }
     }
 
-    pub fn deadline_us(&self) -> Option<u64> {
-        match self.state {
-            Watch::Alive { deadline_us } => Some(deadline_us),
-            Watch::Waiting | Watch::Lost => None,
-        }
-    }
-
     /// Returns the watched node when it has just been lost.
     pub fn expire(&mut self, now_us: u64) -> Option<u8> {
-        if self
-            .deadline_us()
-            .is_none_or(|deadline_us| now_us < deadline_us)
-        {
+        if now_us < self.deadline_us {
             return None;
         }
-        self.state = Watch::Lost;
+        self.deadline_us = NEVER_US;
+        self.lost = true;
         self.last = None;
         Some(self.node)
     }
-}
-
-pub(crate) fn micros(milliseconds: u16) -> u64 {
-    u64::from(milliseconds) * 1_000
 }

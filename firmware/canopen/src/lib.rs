@@ -64,6 +64,7 @@ mod application;
 mod cob_id;
 mod communication;
 mod config;
+mod deadline;
 mod emergency;
 mod event;
 mod frame;

@@ -25,16 +25,16 @@ const INQUIRE_NODE_ID: u8 = 0x5E;
 /// "Bit checked" of a fastscan that asks whether anybody is there.
 const ANYBODY: u8 = 0x80;
 /// Error codes of the answers.
-const OUT_OF_RANGE: u8 = 1;
-const NOT_STORED: u8 = 2;
+const OUT_OF_RANGE: u32 = 1;
+const NOT_STORED: u32 = 2;
 
 /// What the node has to do about a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// Nothing.
     Silence,
-    /// Send this.
-    Answer([u8; 8]),
+    /// Send this, the command and four bytes, lowest first.
+    Answer(u8, u32),
     /// Store the pending node id, then send [`stored`].
     Store,
     /// The configuration has ended: an unconfigured node takes its pending id.
@@ -87,7 +87,7 @@ impl Lss {
             0x40..=0x43 if !self.configuring => self.select(command - 0x40, number, identity),
             0x46..=0x4B => self.identify(command - 0x46, number, identity),
             IDENTIFY_UNCONFIGURED if self.is_unconfigured(active) => {
-                answer(UNCONFIGURED_IDENTIFIED, [0; 4])
+                Outcome::Answer(UNCONFIGURED_IDENTIFIED, 0)
             }
             FASTSCAN if !self.configuring && self.is_unconfigured(active) => {
                 self.scan(number, rest, identity)
@@ -100,21 +100,15 @@ impl Lss {
                 if is_allowed {
                     self.pending = first;
                 }
-                answer(
-                    command,
-                    [if is_allowed { 0 } else { OUT_OF_RANGE }, 0, 0, 0],
-                )
+                Outcome::Answer(command, if is_allowed { 0 } else { OUT_OF_RANGE })
             }
             CONFIGURE_BIT_TIMING => {
                 let is_offered = (first, second) == (0, 0);
-                answer(
-                    command,
-                    [if is_offered { 0 } else { OUT_OF_RANGE }, 0, 0, 0],
-                )
+                Outcome::Answer(command, if is_offered { 0 } else { OUT_OF_RANGE })
             }
             STORE => Outcome::Store,
-            0x5A..=0x5D => answer(command, part(identity, command - 0x5A).to_le_bytes()),
-            INQUIRE_NODE_ID => answer(command, [active, 0, 0, 0]),
+            0x5A..=0x5D => Outcome::Answer(command, part(identity, command - 0x5A)),
+            INQUIRE_NODE_ID => Outcome::Answer(command, active.into()),
             _ => Outcome::Silence,
         }
     }
@@ -150,7 +144,7 @@ impl Lss {
         }
         self.selected = 0;
         self.configuring = true;
-        answer(SELECTED, [0; 4])
+        Outcome::Answer(SELECTED, 0)
     }
 
     fn identify(&mut self, place: u8, number: u32, identity: &Identity) -> Outcome {
@@ -168,7 +162,7 @@ impl Lss {
             return Outcome::Silence;
         }
         self.identified = 0;
-        answer(IDENTIFIED, [0; 4])
+        Outcome::Answer(IDENTIFIED, 0)
     }
 
     /// Answers where all bits of a number from bit `bit` up are this node's.
@@ -176,7 +170,7 @@ impl Lss {
         let [bit, place, next] = rest;
         if bit == ANYBODY {
             self.scanned = 0;
-            return answer(IDENTIFIED, [0; 4]);
+            return Outcome::Answer(IDENTIFIED, 0);
         }
         if bit > 31 || place > 3 || next > 3 || place != self.scanned {
             return Outcome::Silence;
@@ -189,21 +183,17 @@ impl Lss {
             self.configuring = next < place;
             self.scanned = next;
         }
-        answer(IDENTIFIED, [0; 4])
+        Outcome::Answer(IDENTIFIED, 0)
     }
 }
 
 /// Returns the answer to a request to store.
-pub(crate) const fn stored(done: bool) -> [u8; 8] {
-    [STORE, if done { 0 } else { NOT_STORED }, 0, 0, 0, 0, 0, 0]
-}
-
-const fn answer(command: u8, data: [u8; 4]) -> Outcome {
-    let [a, b, c, d] = data;
-    Outcome::Answer([command, a, b, c, d, 0, 0, 0])
+pub(crate) const fn stored(done: bool) -> Outcome {
+    Outcome::Answer(STORE, if done { 0 } else { NOT_STORED })
 }
 
 /// Returns a number of the identity in the order of object 0x1018.
+#[inline(never)] // One copy in flash.
 const fn part(identity: &Identity, place: u8) -> u32 {
     match place {
         0 => identity.vendor,

@@ -44,9 +44,8 @@ pub struct Counters {
 /// A CANopen slave: one node id on one bus.
 ///
 /// Its owner gives it every frame of the bus and calls [`tick`](Self::tick) once per millisecond or
-/// so, or at [`next_deadline_us`](Self::next_deadline_us); then it drains
-/// [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event). Time is in
-/// microseconds from any start and never goes back.
+/// so; then it drains [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event).
+/// Time is in microseconds from any start and never goes back.
 #[derive(Clone, Debug)]
 pub struct Node {
     config: Config,
@@ -62,6 +61,8 @@ pub struct Node {
     /// What is being stored, and who waits for it.
     storing: Option<StoreRequest>,
     waiting: Option<Waiting>,
+    /// When an SDO client has waited for too long.
+    waiting_until_us: u64,
     transmit: TransmitQueue,
     events: EventQueue<Event, EVENTS>,
     rpdos_short: u32,
@@ -72,8 +73,8 @@ pub struct Node {
 /// Who waits for something to be stored.
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
-    /// The SDO client, which gets this answer once it is done and never later than `deadline_us`.
-    Sdo { answer: [u8; 8], deadline_us: u64 },
+    /// The SDO client, which gets this answer once it is done.
+    Sdo([u8; 8]),
     /// The LSS master.
     Lss,
 }
@@ -103,16 +104,19 @@ impl Node {
             sdo: Server::new(),
             lss: Lss::new(config.node_id),
             stored_id: config.node_id,
-            stored: Vec::from_slice(stored).unwrap_or_default(),
+            stored: Vec::new(),
             stored_refused: false,
             storing: None,
             waiting: None,
+            waiting_until_us: 0,
             transmit: TransmitQueue::default(),
             events: EventQueue::default(),
             rpdos_short: 0,
             rpdos_refused: 0,
             tpdos_refused: 0,
         };
+        // None of them where they are too many.
+        let _ = node.stored.extend_from_slice(stored);
         node.load(now_us);
         if node.stored.len() != stored.len() || !stored::is_served(&node.communication, app) {
             node.stored.clear();
@@ -162,31 +166,6 @@ impl Node {
         }
         self.stream(now_us, app);
         self.settle(now_us, app);
-    }
-
-    /// Returns the time at which [`tick`](Self::tick) has something to do; `None` when only a
-    /// frame can give the node work. It is past while segments of an SDO block upload find room.
-    #[inline(never)] // One copy in flash, and a small one.
-    pub fn next_deadline_us(&self) -> Option<u64> {
-        if self.state == NmtState::Initialising {
-            return None;
-        }
-        let mut deadline = earlier(self.communication.deadline_us(), self.sdo.deadline_us());
-        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting {
-            deadline = earlier(deadline, Some(deadline_us));
-        }
-        if self.sdo.has_segment() && self.transmit.has_sdo_room() {
-            deadline = Some(0);
-        }
-        if self.state != NmtState::Stopped {
-            deadline = earlier(deadline, self.communication.emergency.deadline_us());
-        }
-        if self.state == NmtState::Operational {
-            for tpdo in &self.communication.tpdos {
-                deadline = earlier(deadline, tpdo.deadline_us());
-            }
-        }
-        deadline
     }
 
     /// Takes the next frame to send.
@@ -369,12 +348,16 @@ impl Node {
                 .raise_fault(Fault::Heartbeat, node);
             self.behave_after_error(now_us);
         }
-        let streaming = self.sdo.is_streaming();
-        if let Some(message) = self.sdo.expire(now_us) {
-            self.withdraw(streaming);
-            self.answer(message);
+        if !self.sdo.is_idle() {
+            let streaming = self.sdo.is_streaming();
+            if let Some(message) = self.sdo.expire(now_us) {
+                self.withdraw(streaming);
+                self.answer(message);
+            }
         }
-        self.expire_store(now_us);
+        if self.waiting.is_some() {
+            self.expire_store(now_us);
+        }
     }
 
     fn hear(&mut self, now_us: u64, data: &[u8]) {
@@ -475,11 +458,4 @@ fn sdo_cob_id(node_id: u8) -> u16 {
 
 fn heartbeat_cob_id(node_id: u8) -> u16 {
     0x700 + u16::from(node_id)
-}
-
-fn earlier(a: Option<u64>, b: Option<u64>) -> Option<u64> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    }
 }

@@ -3,7 +3,6 @@
 
 use crate::communication::Communication;
 use crate::emergency::Fault;
-use crate::pdo::{Parameters, Rpdo, Tpdo};
 use crate::{Abort, Access, Application, Config, Entry, Group, Mapped, StoreRequest};
 
 /// The highest subindex of 0x1400 and of 0x1800.
@@ -26,22 +25,22 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// What 0x1010 and 0x1011 read as: it is done on command.
 const ON_COMMAND: u32 = 1;
 
-/// An object's value with its type.
+/// An object's number and its length in bytes.
 #[derive(Clone, Copy, Debug)]
-enum Value {
-    U8(u8),
-    U16(u16),
-    U32(u32),
-    Text(&'static str),
+struct Value {
+    raw: u32,
+    length: u8,
 }
 
-/// The four groups of PDO objects, with the PDO's place.
+/// An object of a PDO that the node has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum PdoObject {
-    RpdoParameters(usize),
-    RpdoMapping(usize),
-    TpdoParameters(usize),
-    TpdoMapping(usize),
+struct PdoObject {
+    /// It belongs to a TPDO, not to an RPDO.
+    transmits: bool,
+    /// It is the mapping, not the communication parameters.
+    is_mapping: bool,
+    /// The PDO's place.
+    place: usize,
 }
 
 impl Objects<'_> {
@@ -54,7 +53,9 @@ impl Objects<'_> {
             index if is_application(index) => self.app.entry(index, subindex),
             0x1000..=0x1FFF => {
                 let length = match self.value(index, subindex) {
-                    Ok(value) => value.length(),
+                    // A text may have any length.
+                    Ok(_) if self.text(index).is_some() => 0,
+                    Ok(value) => value.length,
                     // Known, but empty for now.
                     Err(Abort::NoData) => 4,
                     Err(abort) => return Err(abort),
@@ -86,7 +87,12 @@ impl Objects<'_> {
                     Err(Abort::OutOfMemory)
                 }
             }
-            0x1000..=0x1FFF => self.value(index, subindex)?.copy_to(out),
+            0x1000..=0x1FFF => {
+                let value = self.value(index, subindex)?;
+                let number = value.raw.to_le_bytes();
+                let number = number.get(..usize::from(value.length)).unwrap_or(&[]);
+                copy(self.text(index).map_or(number, str::as_bytes), out)
+            }
             _ => Err(Abort::NoObject),
         }
     }
@@ -98,42 +104,52 @@ impl Objects<'_> {
     pub fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
         match index {
             index if is_application(index) => self.app.write(index, subindex, data),
-            0x1000..=0x1FFF => self.write_communication(index, subindex, data),
+            0x1000..=0x1FFF => self.write_communication(index, subindex, number(data)),
             _ => Err(Abort::NoObject),
         }
     }
 
+    /// Returns the object that is a text.
+    const fn text(&self, index: u16) -> Option<&'static str> {
+        match index {
+            0x1008 => Some(self.config.device_name),
+            0x1009 => Some(self.config.hardware_version),
+            0x100A => Some(self.config.software_version),
+            _ => None,
+        }
+    }
+
+    /// Returns an object's number; that of a text is nothing.
+    #[inline(never)] // One copy in flash.
     fn value(&self, index: u16, subindex: u8) -> Result<Value, Abort> {
         let communication = &*self.communication;
         let emergency = &communication.emergency;
         let value = match (index, subindex) {
-            (0x1000, 0) => Value::U32(self.config.device_type),
-            (0x1001, 0) => Value::U8(emergency.register()),
-            (0x1003, 0) => Value::U8(emergency.history_length()),
-            (0x1003, 1..) => Value::U32(emergency.history(subindex)?),
-            (0x1005, 0) => Value::U32(u32::from(communication.sync.cob_id())),
-            (0x1008, 0) => Value::Text(self.config.device_name),
-            (0x1009, 0) => Value::Text(self.config.hardware_version),
-            (0x100A, 0) => Value::Text(self.config.software_version),
-            (0x1010 | 0x1011, 0) => Value::U8(3),
-            (0x1010 | 0x1011, 1..=3) => Value::U32(ON_COMMAND),
-            (0x1012, 0) => Value::U32(communication.time.to_raw()),
-            (0x1014, 0) => Value::U32(emergency.raw_cob_id()),
-            (0x1015, 0) => Value::U16(emergency.inhibit_100us()),
-            (0x1016, 0) => Value::U8(1),
-            (0x1016, 1) => Value::U32(communication.consumer.to_raw()),
-            (0x1017, 0) => Value::U16(communication.producer.period_ms()),
-            (0x1018, 0) => Value::U8(4),
-            (0x1018, 1) => Value::U32(self.config.identity.vendor),
-            (0x1018, 2) => Value::U32(self.config.identity.product),
-            (0x1018, 3) => Value::U32(self.config.identity.revision),
-            (0x1018, 4) => Value::U32(self.config.identity.serial),
-            (0x1019, 0) => Value::U8(communication.sync.overflow()),
-            (0x1029, 0) => Value::U8(1),
-            (0x1029, 1) => Value::U8(communication.error_behaviour),
-            (0x1200, 0) => Value::U8(2),
-            (0x1200, 1) => Value::U32(0x600 + u32::from(self.config.node_id)),
-            (0x1200, 2) => Value::U32(0x580 + u32::from(self.config.node_id)),
+            (0x1000, 0) => u32(self.config.device_type),
+            (0x1001, 0) => u8(emergency.register()),
+            (0x1003, 0) => u8(emergency.history_length()),
+            (0x1003, 1..) => u32(emergency.history(subindex)?),
+            (0x1005, 0) => u32(communication.sync.cob_id().into()),
+            (0x1008..=0x100A, 0) => u8(0),
+            (0x1010 | 0x1011, 0) => u8(3),
+            (0x1010 | 0x1011, 1..=3) => u32(ON_COMMAND),
+            (0x1012, 0) => u32(communication.time.to_raw()),
+            (0x1014, 0) => u32(emergency.raw_cob_id()),
+            (0x1015, 0) => u16(emergency.inhibit_100us()),
+            (0x1016, 0) => u8(1),
+            (0x1016, 1) => u32(communication.consumer.to_raw()),
+            (0x1017, 0) => u16(communication.producer.period_ms()),
+            (0x1018, 0) => u8(4),
+            (0x1018, 1) => u32(self.config.identity.vendor),
+            (0x1018, 2) => u32(self.config.identity.product),
+            (0x1018, 3) => u32(self.config.identity.revision),
+            (0x1018, 4) => u32(self.config.identity.serial),
+            (0x1019, 0) => u8(communication.sync.overflow()),
+            (0x1029, 0) => u8(1),
+            (0x1029, 1) => u8(communication.error_behaviour),
+            (0x1200, 0) => u8(2),
+            (0x1200, 1) => u32(0x600 + u32::from(self.config.node_id)),
+            (0x1200, 2) => u32(0x580 + u32::from(self.config.node_id)),
             (0x1000 | 0x1001 | 0x1005 | 0x1008..=0x100A | 0x1010..=0x1012, _)
             | (0x1014..=0x1019 | 0x1029 | 0x1200, _) => return Err(Abort::NoSubindex),
             _ => return self.pdo_value(index, subindex),
@@ -141,59 +157,83 @@ impl Objects<'_> {
         Ok(value)
     }
 
-    fn pdo_object(&self, index: u16) -> Option<PdoObject> {
-        let place = usize::from(index & 0x00FF);
-        let (object, present) = match index & 0xFF00 {
-            0x1400 => (PdoObject::RpdoParameters(place), self.config.rpdos.len()),
-            0x1600 => (PdoObject::RpdoMapping(place), self.config.rpdos.len()),
-            0x1800 => (PdoObject::TpdoParameters(place), self.config.tpdos.len()),
-            0x1A00 => (PdoObject::TpdoMapping(place), self.config.tpdos.len()),
-            _ => return None,
+    fn pdo_object(&self, index: u16) -> Result<PdoObject, Abort> {
+        let (transmits, is_mapping) = match index >> 8 {
+            0x14 => (false, false),
+            0x16 => (false, true),
+            0x18 => (true, false),
+            0x1A => (true, true),
+            _ => return Err(Abort::NoObject),
         };
-        (place < present).then_some(object)
+        let place = usize::from(index & 0x00FF);
+        let listed = if transmits {
+            self.config.tpdos
+        } else {
+            self.config.rpdos
+        };
+        if place >= listed.len() {
+            return Err(Abort::NoObject);
+        }
+        Ok(PdoObject {
+            transmits,
+            is_mapping,
+            place,
+        })
     }
 
     fn pdo_value(&self, index: u16, subindex: u8) -> Result<Value, Abort> {
-        let rpdo = |place: usize| self.communication.rpdos.get(place).ok_or(Abort::NoObject);
-        let tpdo = |place: usize| self.communication.tpdos.get(place).ok_or(Abort::NoObject);
-        match self.pdo_object(index).ok_or(Abort::NoObject)? {
-            PdoObject::RpdoParameters(place) => rpdo_value(rpdo(place)?, subindex),
-            PdoObject::TpdoParameters(place) => tpdo_value(tpdo(place)?, subindex),
-            PdoObject::RpdoMapping(place) => mapping_value(&rpdo(place)?.parameters, subindex),
-            PdoObject::TpdoMapping(place) => mapping_value(&tpdo(place)?.parameters, subindex),
-        }
+        let object = self.pdo_object(index)?;
+        let Communication { rpdos, tpdos, .. } = &*self.communication;
+        let tpdo = tpdos.get(object.place).ok_or(Abort::NoObject)?;
+        let rpdo = rpdos.get(object.place).ok_or(Abort::NoObject)?;
+        let (parameters, highest) = if object.transmits {
+            (&tpdo.parameters, TPDO_PARAMETERS)
+        } else {
+            (&rpdo.parameters, RPDO_PARAMETERS)
+        };
+        Ok(match subindex {
+            0 if object.is_mapping => u8(parameters.count()),
+            _ if object.is_mapping => u32(parameters.entry(subindex)?),
+            0 => u8(highest),
+            1 => u32(parameters.raw_cob_id()),
+            2 => u8(parameters.transmission()),
+            3 if object.transmits => u16(tpdo.inhibit_100us()),
+            5 if object.transmits => u16(tpdo.event_ms()),
+            6 if object.transmits => u8(tpdo.sync_start()),
+            _ => return Err(Abort::NoSubindex),
+        })
     }
 
-    fn write_communication(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
+    fn write_communication(&mut self, index: u16, subindex: u8, raw: u32) -> Result<(), Abort> {
         if index != 0x1003 {
             self.app.may_configure()?;
         }
         let communication = &mut *self.communication;
         match (index, subindex) {
-            (0x1003, 0) => match u8_from(data)? {
-                0 => communication.emergency.clear_history(),
-                _ => return Err(Abort::Value),
-            },
-            (0x1005, 0) => communication.sync.write_cob_id(u32_from(data)?)?,
+            (0x1003, 0) => {
+                if raw != 0 {
+                    return Err(Abort::Value);
+                }
+                communication.emergency.clear_history();
+            }
+            (0x1005, 0) => communication.sync.write_cob_id(raw)?,
             (0x1010, 1..=3) => {
-                return self.ask_to_store(u32_from(data)? == SAVE, subindex, StoreRequest::Save);
+                return self.ask_to_store(raw == SAVE, subindex, StoreRequest::Save);
             }
             (0x1011, 1..=3) => {
-                return self.ask_to_store(u32_from(data)? == LOAD, subindex, StoreRequest::Restore);
+                return self.ask_to_store(raw == LOAD, subindex, StoreRequest::Restore);
             }
-            (0x1012, 0) => communication.time.write(u32_from(data)?)?,
-            (0x1014, 0) => communication.emergency.write_cob_id(u32_from(data)?)?,
-            (0x1015, 0) => communication.emergency.set_inhibit(u16_from(data)?),
+            (0x1012, 0) => communication.time.write(raw)?,
+            (0x1014, 0) => communication.emergency.write_cob_id(raw)?,
+            (0x1015, 0) => communication.emergency.set_inhibit(raw as u16),
             (0x1016, 1) => {
-                communication.consumer = crate::heartbeat::Consumer::from_raw(u32_from(data)?)?;
+                communication.consumer = crate::heartbeat::Consumer::from_raw(raw)?;
                 communication.emergency.clear_fault(Fault::Heartbeat);
             }
-            (0x1017, 0) => communication
-                .producer
-                .set_period(u16_from(data)?, self.now_us),
-            (0x1019, 0) => communication.sync.write_overflow(u8_from(data)?)?,
-            (0x1029, 1) => communication.write_error_behaviour(u8_from(data)?)?,
-            _ => return self.write_pdo(index, subindex, data),
+            (0x1017, 0) => communication.producer.set_period(raw as u16, self.now_us),
+            (0x1019, 0) => communication.sync.write_overflow(raw as u8)?,
+            (0x1029, 1) => communication.write_error_behaviour(raw as u8)?,
+            _ => return self.write_pdo(index, subindex, raw),
         }
         Ok(())
     }
@@ -215,65 +255,69 @@ impl Objects<'_> {
         Ok(())
     }
 
-    fn write_pdo(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort> {
-        let object = self.pdo_object(index).ok_or(Abort::NoObject)?;
-        let now_us = self.now_us;
+    #[inline(never)] // One copy in flash.
+    fn write_pdo(&mut self, index: u16, subindex: u8, raw: u32) -> Result<(), Abort> {
+        let object = self.pdo_object(index)?;
         // The dictionary is asked before a PDO of it is borrowed.
-        let described = match u32_from(data) {
-            Ok(raw) if subindex > 0 => {
-                let mapped = Mapped::from_raw(raw);
-                self.describe(mapped.index, mapped.subindex)
-            }
-            _ => Err(Abort::NoObject),
+        let described = if object.is_mapping && subindex > 0 {
+            let mapped = Mapped::from_raw(raw);
+            self.describe(mapped.index, mapped.subindex)
+        } else {
+            Err(Abort::NoObject)
         };
-        let communication = &mut *self.communication;
-        match object {
-            PdoObject::RpdoParameters(place) => {
-                let rpdo = communication.rpdos.get_mut(place).ok_or(Abort::NoObject)?;
-                write_rpdo(rpdo, subindex, data)?;
-                if subindex == 1 && !rpdo.parameters.is_enabled() {
-                    let number = place as u8 + 1;
-                    communication
-                        .emergency
-                        .clear_fault(Fault::RpdoLength(number));
-                }
-                Ok(())
-            }
-            PdoObject::TpdoParameters(place) => {
-                let tpdo = communication.tpdos.get_mut(place).ok_or(Abort::NoObject)?;
-                write_tpdo(tpdo, subindex, data, now_us)
-            }
-            PdoObject::RpdoMapping(place) => {
-                let rpdo = communication.rpdos.get_mut(place).ok_or(Abort::NoObject)?;
-                write_mapping(&mut rpdo.parameters, subindex, data, described)
-            }
-            PdoObject::TpdoMapping(place) => {
-                let tpdo = communication.tpdos.get_mut(place).ok_or(Abort::NoObject)?;
-                write_mapping(&mut tpdo.parameters, subindex, data, described)
-            }
+        let Communication {
+            rpdos,
+            tpdos,
+            emergency,
+            ..
+        } = &mut *self.communication;
+        let tpdo = tpdos.get_mut(object.place).ok_or(Abort::NoObject)?;
+        let rpdo = rpdos.get_mut(object.place).ok_or(Abort::NoObject)?;
+        let parameters = if object.transmits {
+            &mut tpdo.parameters
+        } else {
+            &mut rpdo.parameters
+        };
+        match subindex {
+            0 if object.is_mapping => return parameters.write_count(raw as u8),
+            _ if object.is_mapping => return parameters.write_entry(subindex, raw, described),
+            1 => parameters.write_cob_id(raw)?,
+            2 => parameters.write_transmission(raw as u8)?,
+            3 if object.transmits => tpdo.write_inhibit(raw as u16)?,
+            5 if object.transmits => tpdo.set_event(raw as u16),
+            6 if object.transmits => tpdo.write_sync_start(raw as u8)?,
+            _ => return Err(Abort::NoSubindex),
         }
+        if object.transmits {
+            tpdo.restart(self.now_us);
+        } else if subindex == 1 && !rpdo.parameters.is_enabled() {
+            rpdo.forget();
+            emergency.clear_fault(Fault::RpdoLength(object.place as u8 + 1));
+        }
+        Ok(())
     }
 }
 
-impl Value {
-    /// Returns the length in bytes; 0 for a text, which may have any.
-    const fn length(self) -> u8 {
-        match self {
-            Self::U8(_) => 1,
-            Self::U16(_) => 2,
-            Self::U32(_) => 4,
-            Self::Text(_) => 0,
-        }
-    }
+const fn u8(number: u8) -> Value {
+    value(number as u32, 1)
+}
 
-    fn copy_to(self, out: &mut [u8]) -> Result<usize, Abort> {
-        match self {
-            Self::U8(value) => copy(&[value], out),
-            Self::U16(value) => copy(&value.to_le_bytes(), out),
-            Self::U32(value) => copy(&value.to_le_bytes(), out),
-            Self::Text(text) => copy(text.as_bytes(), out),
-        }
-    }
+const fn u16(number: u16) -> Value {
+    value(number as u32, 2)
+}
+
+const fn u32(number: u32) -> Value {
+    value(number, 4)
+}
+
+const fn value(raw: u32, length: u8) -> Value {
+    Value { raw, length }
+}
+
+/// Reads a number of at most four bytes; more do not count.
+fn number(data: &[u8]) -> u32 {
+    let bytes = data.iter().take(4).rev();
+    bytes.fold(0, |number, byte| number << 8 | u32::from(*byte))
 }
 
 fn copy(bytes: &[u8], out: &mut [u8]) -> Result<usize, Abort> {
@@ -298,90 +342,4 @@ const fn access(index: u16, subindex: u8) -> Access {
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, _) => Access::ReadWrite,
         _ => Access::Constant,
     }
-}
-
-fn rpdo_value(rpdo: &Rpdo, subindex: u8) -> Result<Value, Abort> {
-    match subindex {
-        0 => Ok(Value::U8(RPDO_PARAMETERS)),
-        1 => Ok(Value::U32(rpdo.parameters.raw_cob_id())),
-        2 => Ok(Value::U8(rpdo.parameters.transmission())),
-        _ => Err(Abort::NoSubindex),
-    }
-}
-
-fn tpdo_value(tpdo: &Tpdo, subindex: u8) -> Result<Value, Abort> {
-    match subindex {
-        0 => Ok(Value::U8(TPDO_PARAMETERS)),
-        1 => Ok(Value::U32(tpdo.parameters.raw_cob_id())),
-        2 => Ok(Value::U8(tpdo.parameters.transmission())),
-        3 => Ok(Value::U16(tpdo.inhibit_100us())),
-        5 => Ok(Value::U16(tpdo.event_ms())),
-        6 => Ok(Value::U8(tpdo.sync_start())),
-        _ => Err(Abort::NoSubindex),
-    }
-}
-
-fn mapping_value(parameters: &Parameters, subindex: u8) -> Result<Value, Abort> {
-    match subindex {
-        0 => Ok(Value::U8(parameters.count())),
-        _ => parameters.entry(subindex).map(Value::U32),
-    }
-}
-
-fn write_rpdo(rpdo: &mut Rpdo, subindex: u8, data: &[u8]) -> Result<(), Abort> {
-    match subindex {
-        1 => {
-            rpdo.parameters.write_cob_id(u32_from(data)?)?;
-            if !rpdo.parameters.is_enabled() {
-                rpdo.forget();
-            }
-            Ok(())
-        }
-        2 => rpdo.parameters.write_transmission(u8_from(data)?),
-        _ => Err(Abort::NoSubindex),
-    }
-}
-
-fn write_tpdo(tpdo: &mut Tpdo, subindex: u8, data: &[u8], now_us: u64) -> Result<(), Abort> {
-    match subindex {
-        1 => tpdo.parameters.write_cob_id(u32_from(data)?)?,
-        2 => tpdo.parameters.write_transmission(u8_from(data)?)?,
-        3 => tpdo.write_inhibit(u16_from(data)?)?,
-        5 => tpdo.set_event(u16_from(data)?),
-        6 => tpdo.write_sync_start(u8_from(data)?)?,
-        _ => return Err(Abort::NoSubindex),
-    }
-    tpdo.restart(now_us);
-    Ok(())
-}
-
-fn write_mapping(
-    parameters: &mut Parameters,
-    subindex: u8,
-    data: &[u8],
-    described: Result<Entry, Abort>,
-) -> Result<(), Abort> {
-    match subindex {
-        0 => parameters.write_count(u8_from(data)?),
-        _ => parameters.write_entry(subindex, u32_from(data)?, described),
-    }
-}
-
-fn u8_from(data: &[u8]) -> Result<u8, Abort> {
-    let &[byte] = data else {
-        return Err(Abort::Length);
-    };
-    Ok(byte)
-}
-
-fn u16_from(data: &[u8]) -> Result<u16, Abort> {
-    Ok(u16::from_le_bytes(
-        data.try_into().map_err(|_| Abort::Length)?,
-    ))
-}
-
-fn u32_from(data: &[u8]) -> Result<u32, Abort> {
-    Ok(u32::from_le_bytes(
-        data.try_into().map_err(|_| Abort::Length)?,
-    ))
 }

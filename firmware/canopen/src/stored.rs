@@ -25,80 +25,98 @@ const PREDEFINED: u16 = 1 << 14;
 /// Set in the identifier of what is disabled.
 const DISABLED: u16 = 1 << 15;
 
-/// Bytes that are written one behind the other.
+/// Numbers that are written one behind the other; whether they found room is asked at the end.
 struct Writer<'a> {
     out: &'a mut [u8],
     written: usize,
+    failed: bool,
 }
 
 impl Writer<'_> {
-    fn put<const N: usize>(&mut self, bytes: [u8; N]) -> Option<()> {
-        let end = self.written + N;
-        self.out.get_mut(self.written..end)?.copy_from_slice(&bytes);
-        self.written = end;
-        Some(())
+    /// Writes the lowest `length` bytes of a number, at most four.
+    #[inline(never)] // One copy in flash.
+    fn put(&mut self, length: usize, number: u32) {
+        let slot = self
+            .out
+            .get_mut(self.written..self.written.saturating_add(length));
+        self.failed |= slot.is_none();
+        for (to, from) in slot
+            .unwrap_or_default()
+            .iter_mut()
+            .zip(number.to_le_bytes())
+        {
+            *to = from;
+        }
+        self.written = self.written.saturating_add(length);
     }
 
-    fn put_identifier(&mut self, cob_id: u16, predefined: u16, enabled: bool) -> Option<()> {
+    fn put_identifier(&mut self, cob_id: u16, predefined: u16, enabled: bool) {
         let identifier = if cob_id == predefined {
             PREDEFINED
         } else {
             cob_id
         };
         let disabled = if enabled { 0 } else { DISABLED };
-        self.put((identifier | disabled).to_le_bytes())
+        self.put(2, u32::from(identifier | disabled));
     }
 
-    fn put_pdo(&mut self, parameters: &Parameters, predefined: u16) -> Option<()> {
+    fn put_pdo(&mut self, parameters: &Parameters, predefined: u16) {
         let enabled = parameters.is_enabled();
-        self.put_identifier(parameters.cob_id(), predefined, enabled)?;
-        self.put([parameters.transmission(), parameters.count()])?;
-        parameters
-            .entries()
-            .iter()
-            .try_for_each(|mapped| self.put(mapped.to_raw().to_le_bytes()))
+        self.put_identifier(parameters.cob_id(), predefined, enabled);
+        self.put(1, parameters.transmission().into());
+        self.put(1, parameters.count().into());
+        for mapped in parameters.entries() {
+            self.put(4, mapped.to_raw());
+        }
     }
 }
 
-/// Bytes that are read one behind the other.
+/// Numbers that are read one behind the other; whether there were so many is asked at the end.
 struct Reader<'a> {
     rest: &'a [u8],
+    failed: bool,
 }
 
 impl Reader<'_> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (bytes, rest) = self.rest.split_first_chunk()?;
+    /// Reads bytes; zeros behind the end.
+    #[inline(never)] // One copy of each length in flash.
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let Some((bytes, rest)) = self.rest.split_first_chunk() else {
+            self.failed = true;
+            return [0; N];
+        };
         self.rest = rest;
-        Some(*bytes)
+        *bytes
     }
 
-    fn take_u8(&mut self) -> Option<u8> {
-        self.take().map(u8::from_le_bytes)
+    fn take_u8(&mut self) -> u8 {
+        u8::from_le_bytes(self.take())
     }
 
-    fn take_u16(&mut self) -> Option<u16> {
-        self.take().map(u16::from_le_bytes)
+    fn take_u16(&mut self) -> u16 {
+        u16::from_le_bytes(self.take())
     }
 
-    fn take_u32(&mut self) -> Option<u32> {
-        self.take().map(u32::from_le_bytes)
+    fn take_u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
     }
 
     /// Returns an identifier, and whether what it belongs to is enabled.
-    fn take_identifier(&mut self, predefined: u16) -> Option<(u16, bool)> {
-        let raw = self.take_u16()?;
+    fn take_identifier(&mut self, predefined: u16) -> (u16, bool) {
+        let raw = self.take_u16();
         let cob_id = match raw & !DISABLED {
             PREDEFINED => predefined,
             other => other,
         };
-        Some((cob_id, raw & DISABLED == 0))
+        (cob_id, raw & DISABLED == 0)
     }
 
+    #[inline(never)] // One copy in flash.
     fn take_pdo(&mut self, parameters: &mut Parameters, predefined: u16) -> Option<()> {
-        let (cob_id, enabled) = self.take_identifier(predefined)?;
-        let [transmission, count] = self.take()?;
+        let (cob_id, enabled) = self.take_identifier(predefined);
+        let (transmission, count) = (self.take_u8(), self.take_u8());
         for mapped in parameters.entries_mut() {
-            *mapped = Mapped::from_raw(self.take_u32()?);
+            *mapped = Mapped::from_raw(self.take_u32());
         }
         parameters.restore(cob_id, enabled, transmission, count)
     }
@@ -116,32 +134,37 @@ pub(crate) fn save(
     config: &Config,
     out: &mut [u8],
 ) -> Option<usize> {
-    let mut writer = Writer { out, written: 0 };
+    let mut writer = Writer {
+        out,
+        written: 0,
+        failed: false,
+    };
     let emergency = &communication.emergency;
-    writer.put([VERSION])?;
-    writer.put(communication.sync.cob_id().to_le_bytes())?;
-    writer.put([communication.sync.overflow()])?;
-    writer.put(communication.time.to_raw().to_le_bytes())?;
+    writer.put(1, VERSION.into());
+    writer.put(2, communication.sync.cob_id().into());
+    writer.put(1, communication.sync.overflow().into());
+    writer.put(4, communication.time.to_raw());
     let own = predefined(0x080, config.node_id);
-    writer.put_identifier(emergency.cob_id(), own, emergency.is_enabled())?;
-    writer.put(emergency.inhibit_100us().to_le_bytes())?;
-    writer.put(communication.consumer.to_raw().to_le_bytes())?;
-    writer.put(communication.producer.period_ms().to_le_bytes())?;
-    writer.put([communication.error_behaviour])?;
+    writer.put_identifier(emergency.cob_id(), own, emergency.is_enabled());
+    writer.put(2, emergency.inhibit_100us().into());
+    writer.put(4, communication.consumer.to_raw());
+    writer.put(2, communication.producer.period_ms().into());
+    writer.put(1, communication.error_behaviour.into());
     let (rpdos, tpdos) = (config.rpdos, config.tpdos);
-    writer.put([present(rpdos.len()), present(tpdos.len())])?;
+    writer.put(1, present(rpdos.len()).into());
+    writer.put(1, present(tpdos.len()).into());
     for (rpdo, default) in communication.rpdos.iter().zip(rpdos) {
         let predefined = predefined(default.cob_id_base, config.node_id);
-        writer.put_pdo(&rpdo.parameters, predefined)?;
+        writer.put_pdo(&rpdo.parameters, predefined);
     }
     for (tpdo, default) in communication.tpdos.iter().zip(tpdos) {
         let predefined = predefined(default.cob_id_base, config.node_id);
-        writer.put_pdo(&tpdo.parameters, predefined)?;
-        writer.put(tpdo.inhibit_100us().to_le_bytes())?;
-        writer.put(tpdo.event_ms().to_le_bytes())?;
-        writer.put([tpdo.sync_start()])?;
+        writer.put_pdo(&tpdo.parameters, predefined);
+        writer.put(2, tpdo.inhibit_100us().into());
+        writer.put(2, tpdo.event_ms().into());
+        writer.put(1, tpdo.sync_start().into());
     }
-    Some(writer.written)
+    (!writer.failed).then_some(writer.written)
 }
 
 /// Takes stored parameters over into fresh ones. Where they are wrong it returns `None`, and has
@@ -153,24 +176,26 @@ pub(crate) fn load(
     stored: &[u8],
     now_us: u64,
 ) -> Option<()> {
-    let mut reader = Reader { rest: stored };
-    if reader.take_u8()? != VERSION {
+    let mut reader = Reader {
+        rest: stored,
+        failed: false,
+    };
+    if reader.take_u8() != VERSION {
         return None;
     }
     let sync = &mut communication.sync;
-    sync.write_cob_id(u32::from(reader.take_u16()?)).ok()?;
-    sync.write_overflow(reader.take_u8()?).ok()?;
-    communication.time.write(reader.take_u32()?).ok()?;
-    let (cob_id, enabled) = reader.take_identifier(predefined(0x080, config.node_id))?;
+    sync.write_cob_id(u32::from(reader.take_u16())).ok()?;
+    sync.write_overflow(reader.take_u8()).ok()?;
+    communication.time.write(reader.take_u32()).ok()?;
+    let (cob_id, enabled) = reader.take_identifier(predefined(0x080, config.node_id));
     communication.emergency.restore(cob_id, enabled)?;
-    communication.emergency.set_inhibit(reader.take_u16()?);
-    communication.consumer = Consumer::from_raw(reader.take_u32()?).ok()?;
-    communication.producer = Producer::new(reader.take_u16()?, now_us);
-    communication
-        .write_error_behaviour(reader.take_u8()?)
-        .ok()?;
+    communication.emergency.set_inhibit(reader.take_u16());
+    communication.consumer = Consumer::from_raw(reader.take_u32()).ok()?;
+    communication.producer = Producer::new(reader.take_u16(), now_us);
+    communication.write_error_behaviour(reader.take_u8()).ok()?;
     let (rpdos, tpdos) = (config.rpdos, config.tpdos);
-    if reader.take()? != [present(rpdos.len()), present(tpdos.len())] {
+    let listed = (present(rpdos.len()), present(tpdos.len()));
+    if (reader.take_u8(), reader.take_u8()) != listed {
         return None;
     }
     for (rpdo, default) in communication.rpdos.iter_mut().zip(rpdos) {
@@ -180,22 +205,26 @@ pub(crate) fn load(
     for (tpdo, default) in communication.tpdos.iter_mut().zip(tpdos) {
         let predefined = predefined(default.cob_id_base, config.node_id);
         reader.take_pdo(&mut tpdo.parameters, predefined)?;
-        tpdo.restore(reader.take_u16()?, reader.take_u16()?, reader.take_u8()?)?;
+        tpdo.restore(reader.take_u16(), reader.take_u16(), reader.take_u8())?;
         tpdo.restart(now_us);
     }
-    reader.rest.is_empty().then_some(())
+    (reader.rest.is_empty() && !reader.failed).then_some(())
 }
 
 /// Tells whether every mapped object exists and may go where it is mapped to.
 pub(crate) fn is_served(communication: &Communication, app: &dyn Application) -> bool {
-    let rpdos = communication.rpdos.iter().map(|rpdo| &rpdo.parameters);
-    let tpdos = communication.tpdos.iter().map(|tpdo| &tpdo.parameters);
-    rpdos.chain(tpdos).all(|parameters| {
-        let mut entries = parameters.entries().iter();
-        entries.all(|mapped| {
-            let described = describe(*mapped, app);
-            parameters.check_entry(*mapped, described).is_ok()
-        })
+    let mut rpdos = communication.rpdos.iter();
+    let mut tpdos = communication.tpdos.iter();
+    rpdos.all(|rpdo| is_mapping_served(&rpdo.parameters, app))
+        && tpdos.all(|tpdo| is_mapping_served(&tpdo.parameters, app))
+}
+
+#[inline(never)] // One copy in flash.
+fn is_mapping_served(parameters: &Parameters, app: &dyn Application) -> bool {
+    let mut entries = parameters.entries().iter();
+    entries.all(|mapped| {
+        let described = describe(*mapped, app);
+        parameters.check_entry(*mapped, described).is_ok()
     })
 }
 

@@ -42,15 +42,11 @@ impl TransmitQueue {
     /// Adds a frame with the first `length` of these bytes behind all others.
     #[inline(never)] // One copy in flash.
     pub fn push(&mut self, cob_id: u16, data: [u8; 8], length: u8) {
-        self.add(Waiting {
+        let frame = Waiting {
             cob_id,
             length,
             data,
-        });
-    }
-
-    #[inline]
-    fn add(&mut self, frame: Waiting) {
+        };
         if self.frames.push_back(frame).is_err() {
             self.dropped = self.dropped.saturating_add(1);
         }
@@ -69,11 +65,7 @@ impl TransmitQueue {
                 waiting.length = length;
                 waiting.data = data;
             }
-            None => self.add(Waiting {
-                cob_id,
-                length,
-                data,
-            }),
+            None => self.push(cob_id, data, length),
         }
     }
 

@@ -314,7 +314,6 @@ fn a_silent_client_loses_its_transfer_after_a_second() {
     bench.sdo([0x40, 0x08, 0x10, 0, 0, 0, 0, 0]);
     bench.pass_ms(999);
     bench.sdo([0x60, 0, 0, 0, 0, 0, 0, 0]);
-    assert_eq!(bench.node.next_deadline_us(), Some(1_999_000));
     bench.pass_ms(999);
     assert_eq!(bench.sent(), []);
     bench.pass_ms(1);

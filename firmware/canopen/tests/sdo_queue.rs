@@ -58,23 +58,6 @@ fn a_tick_makes_four_segments_at_most() {
 }
 
 #[test]
-fn a_node_with_segments_to_make_wants_its_tick_now() {
-    let mut line = streaming();
-    line.now_us = 5_000;
-    assert_eq!(
-        line.node.next_deadline_us(),
-        Some(1_000_000),
-        "the queue is full; the client has until then"
-    );
-    line.node.poll_transmit();
-    assert!(line.node.next_deadline_us() <= Some(line.now_us));
-    line.stream();
-    assert!(line.node.next_deadline_us() > Some(line.now_us));
-    line.tell(acknowledge(127, 127));
-    assert!(line.node.next_deadline_us() <= Some(line.now_us));
-}
-
-#[test]
 fn a_stalled_bus_ends_an_upload_with_one_message() {
     let mut line = streaming();
     for _ in 0..1_000 {

@@ -1,14 +1,13 @@
 //! What outlives a reset: node id, stored parameters, and who asks for them to be stored.
 
-use heapless::Vec;
-
 use super::{Node, Waiting};
+use crate::deadline::after;
 use crate::lss::{self, Outcome};
 use crate::stored;
 use crate::{Abort, Application, Event, NmtCommand, NmtState, STORED_PARAMETERS, StoreRequest};
 
 /// How long a client waits for something to be stored.
-const STORE_TIMEOUT_US: u64 = 1_000_000;
+const STORE_TIMEOUT_US: u32 = 1_000_000;
 
 impl Node {
     /// Writes the parameters of the communication area to the start of `out` and returns how many
@@ -44,21 +43,19 @@ impl Node {
             }
         }
         match self.waiting.take() {
-            Some(Waiting::Sdo { answer, .. }) => {
+            Some(Waiting::Sdo(answer)) => {
                 let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
                 self.answer(answer);
             }
-            Some(Waiting::Lss) => self.answer_lss(&lss::stored(outcome.is_ok())),
+            Some(Waiting::Lss) => self.answer_lss(lss::stored(outcome.is_ok())),
             None => {}
         }
     }
 
     /// Has an SDO client wait for what it asked to be stored.
     pub(super) fn wait_for_store(&mut self, now_us: u64, answer: [u8; 8]) {
-        self.waiting = Some(Waiting::Sdo {
-            answer,
-            deadline_us: now_us.saturating_add(STORE_TIMEOUT_US),
-        });
+        self.waiting = Some(Waiting::Sdo(answer));
+        self.waiting_until_us = after(now_us, STORE_TIMEOUT_US);
         if let Some(request) = self.storing {
             self.events.push(Event::Store(request));
         }
@@ -66,9 +63,7 @@ impl Node {
 
     /// Tells an SDO client that storing takes too long.
     pub(super) fn expire_store(&mut self, now_us: u64) {
-        if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting
-            && now_us >= deadline_us
-        {
+        if matches!(self.waiting, Some(Waiting::Sdo(_))) && now_us >= self.waiting_until_us {
             self.waiting = None;
             self.answer(refusal(self.storing, Abort::Hardware));
         }
@@ -76,9 +71,10 @@ impl Node {
 
     /// Takes the parameters as they are for those after the next reset.
     fn keep(&mut self) {
-        let mut bytes = [0; STORED_PARAMETERS];
-        let length = self.save_parameters(&mut bytes).unwrap_or(0);
-        self.stored = Vec::from_slice(bytes.get(..length).unwrap_or(&[])).unwrap_or_default();
+        // As long as it can be, so that they fit, and then as long as they are.
+        let _ = self.stored.resize_default(STORED_PARAMETERS);
+        let length = stored::save(&self.communication, &self.config, &mut self.stored);
+        self.stored.truncate(length.unwrap_or(0));
     }
 
     /// Starts the node anew.
@@ -126,10 +122,9 @@ impl Node {
             .lss
             .request(request, &config.identity, config.node_id, config.node_ids);
         match outcome {
-            Outcome::Silence => {}
-            Outcome::Answer(answer) => self.answer_lss(&answer),
+            Outcome::Silence | Outcome::Answer(..) => self.answer_lss(outcome),
             Outcome::Store if self.storing.is_some() || app.may_configure().is_err() => {
-                self.answer_lss(&lss::stored(false));
+                self.answer_lss(lss::stored(false));
             }
             Outcome::Store => {
                 let request = StoreRequest::NodeId(self.lss.pending());
@@ -158,12 +153,17 @@ impl Node {
         self.events.push(Event::Nmt { command, state });
     }
 
-    fn answer_lss(&mut self, answer: &[u8; 8]) {
-        self.transmit.push(lss::ANSWER, *answer, 8);
+    fn answer_lss(&mut self, outcome: Outcome) {
+        if let Outcome::Answer(command, data) = outcome {
+            let [a, b, c, d] = data.to_le_bytes();
+            let answer = [command, a, b, c, d, 0, 0, 0];
+            self.transmit.push(lss::ANSWER, answer, 8);
+        }
     }
 }
 
 /// Returns the SDO message that refuses what was asked for.
+#[inline(never)] // One copy in flash.
 fn refusal(request: Option<StoreRequest>, abort: Abort) -> [u8; 8] {
     let (low, group) = match request {
         Some(StoreRequest::Save(group)) => (0x10, group as u8),

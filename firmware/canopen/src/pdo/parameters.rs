@@ -27,9 +27,9 @@ pub(crate) struct Parameters {
 
 impl Parameters {
     /// Makes a PDO that the node does not have.
-    pub const fn absent(direction: Direction) -> Self {
+    pub const fn absent() -> Self {
         Self {
-            direction,
+            direction: Direction::Receive,
             enabled: false,
             cob_id: 0,
             transmission: 0,
@@ -41,7 +41,8 @@ impl Parameters {
 
     /// Returns to the default for node `node_id`, in place.
     #[inline(never)] // One copy in flash.
-    pub fn reset(&mut self, default: &PdoDefault, node_id: u8) {
+    pub fn reset(&mut self, direction: Direction, default: &PdoDefault, node_id: u8) {
+        self.direction = direction;
         let is_valid = default.is_valid();
         let valid = if is_valid { default.mapping } else { &[] };
         let mut bits = 0;

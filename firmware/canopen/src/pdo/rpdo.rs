@@ -26,7 +26,7 @@ pub(crate) struct Rpdo {
 impl Rpdo {
     pub const fn absent() -> Self {
         Self {
-            parameters: Parameters::absent(Direction::Receive),
+            parameters: Parameters::absent(),
             pending: None,
         }
     }
@@ -35,7 +35,7 @@ impl Rpdo {
     pub fn reset(&mut self, default: Option<&PdoDefault>, node_id: u8) {
         self.pending = None;
         if let Some(default) = default {
-            self.parameters.reset(default, node_id);
+            self.parameters.reset(Direction::Receive, default, node_id);
         }
     }
 

@@ -1,7 +1,7 @@
 //! A transmit PDO: when it is due.
 
 use super::{Direction, Parameters};
-use crate::heartbeat::micros;
+use crate::deadline::{after, micros};
 use crate::{Abort, PdoDefault};
 
 /// A transmit PDO.
@@ -23,7 +23,7 @@ pub(crate) struct Tpdo {
 impl Tpdo {
     pub const fn absent() -> Self {
         Self {
-            parameters: Parameters::absent(Direction::Transmit),
+            parameters: Parameters::absent(),
             inhibit_100us: 0,
             event_ms: 0,
             sync_start: 0,
@@ -38,7 +38,7 @@ impl Tpdo {
     /// Returns to the default for node `node_id`, if the node has the PDO.
     pub fn reset(&mut self, default: Option<&PdoDefault>, node_id: u8) {
         if let Some(default) = default {
-            self.parameters.reset(default, node_id);
+            self.parameters.reset(Direction::Transmit, default, node_id);
         }
         self.inhibit_100us = 0;
         self.event_ms = 0;
@@ -47,12 +47,13 @@ impl Tpdo {
     }
 
     /// Begins to count SYNCs and time: the node entered Operational, or the PDO was changed.
+    #[inline(never)] // One copy in flash.
     pub fn restart(&mut self, now_us: u64) {
         self.countdown = self.parameters.transmission();
         self.awaits_start = self.sync_start != 0;
         self.requested = false;
         self.inhibited_until_us = now_us;
-        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+        self.event_due_us = after(now_us, micros(self.event_ms));
     }
 
     /// Asks for one transmission.
@@ -61,10 +62,13 @@ impl Tpdo {
     }
 
     /// Counts a SYNC and tells whether the PDO is due with it.
+    #[inline]
     pub fn is_due_at_sync(&mut self, counter: Option<u8>) -> bool {
-        if !self.parameters.is_enabled() {
-            return false;
-        }
+        self.parameters.is_enabled() && self.count_sync(counter)
+    }
+
+    #[inline(never)] // One copy in flash.
+    fn count_sync(&mut self, counter: Option<u8>) -> bool {
         match self.parameters.transmission() {
             0 => core::mem::take(&mut self.requested),
             period @ 1..=240 => {
@@ -83,29 +87,19 @@ impl Tpdo {
         }
     }
 
-    /// Returns when an event-driven PDO must be looked at again.
-    pub fn deadline_us(&self) -> Option<u64> {
-        if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
-            return None;
-        }
-        if self.requested {
-            return Some(self.inhibited_until_us);
-        }
-        (self.event_ms > 0).then(|| self.event_due_us.max(self.inhibited_until_us))
-    }
-
     /// Tells whether an event-driven PDO is due, and counts it as sent.
     #[inline(never)] // One copy in flash.
     pub fn is_due_at(&mut self, now_us: u64) -> bool {
-        if self
-            .deadline_us()
-            .is_none_or(|deadline_us| now_us < deadline_us)
-        {
+        if !self.parameters.is_enabled() || self.parameters.is_synchronous() {
+            return false;
+        }
+        let is_wanted = self.requested || self.event_ms > 0 && now_us >= self.event_due_us;
+        if !is_wanted || now_us < self.inhibited_until_us {
             return false;
         }
         self.requested = false;
-        self.inhibited_until_us = now_us.saturating_add(u64::from(self.inhibit_100us) * 100);
-        self.event_due_us = now_us.saturating_add(micros(self.event_ms));
+        self.inhibited_until_us = after(now_us, u32::from(self.inhibit_100us) * 100);
+        self.event_due_us = after(now_us, micros(self.event_ms));
         true
     }
 

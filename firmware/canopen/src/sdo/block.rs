@@ -3,10 +3,11 @@
 use super::crc::Crc;
 use super::{BLOCK, SEGMENT};
 use crate::Abort;
+use crate::deadline::{NEVER_US, after};
 
 /// Silence in the middle of a block after which the server acknowledges what it has, because the
 /// last segment seems lost.
-const QUIET_US: u64 = 200_000;
+const QUIET_US: u32 = 200_000;
 /// How many blocks in a row may bring nothing.
 const IDLE_BLOCKS: u8 = 4;
 
@@ -31,7 +32,7 @@ pub(super) struct Block {
     /// The client may be out of step: nothing is said before it falls silent.
     out_of_step: bool,
     /// When silence in the middle of the block has lasted too long.
-    quiet_us: Option<u64>,
+    quiet_us: u64,
 }
 
 impl Block {
@@ -47,7 +48,7 @@ impl Block {
             early: false,
             failure: None,
             out_of_step: false,
-            quiet_us: None,
+            quiet_us: NEVER_US,
         }
     }
 
@@ -107,7 +108,7 @@ impl Block {
         let sequence = first & 0x7F;
         let forward = sequence > self.heard;
         self.heard = self.heard.max(sequence);
-        self.quiet_us = Some(now_us.saturating_add(QUIET_US));
+        self.quiet_us = after(now_us, QUIET_US);
         let ends = first & 0x80 != 0 || sequence >= BLOCK;
         if ends && !self.out_of_step {
             return self.acknowledge().map(Heard::Acknowledge);
@@ -119,18 +120,13 @@ impl Block {
         })
     }
 
-    /// Returns when silence in the middle of the block has lasted too long.
-    pub const fn quiet_us(&self) -> Option<u64> {
-        self.quiet_us
-    }
-
     /// Ends the block when the client has fallen silent in the middle of it, and returns how many
     /// segments have come.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
     pub fn expire(&mut self, now_us: u64) -> Result<Option<u8>, Abort> {
-        if self.quiet_us.is_none_or(|quiet_us| now_us < quiet_us) {
+        if now_us < self.quiet_us {
             return Ok(None);
         }
         let good = self.acknowledge()?;
@@ -143,6 +139,7 @@ impl Block {
         self.held.take_if(|_| self.at_end)
     }
 
+    #[inline(never)] // One copy in flash.
     fn acknowledge(&mut self) -> Result<u8, Abort> {
         if let Some(abort) = self.failure {
             return Err(abort);
@@ -157,7 +154,7 @@ impl Block {
         }
         let good = core::mem::take(&mut self.good);
         self.heard = 0;
-        self.quiet_us = None;
+        self.quiet_us = NEVER_US;
         Ok(good)
     }
 }

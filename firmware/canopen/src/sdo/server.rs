@@ -4,11 +4,12 @@ use super::block::{Block, Heard};
 use super::download::Download;
 use super::upload::{Upload, check_block_size};
 use super::{BLOCK, Buffer, Message, Multiplexor, SDO_BUFFER, message};
+use crate::deadline::after;
 use crate::objects::Objects;
 use crate::{Abort, Application};
 
 /// Silence of the client after which a transfer is aborted.
-const TIMEOUT_US: u64 = 1_000_000;
+const TIMEOUT_US: u32 = 1_000_000;
 /// The command of an abort, in both directions.
 const ABORT: u8 = 0x80;
 
@@ -53,6 +54,12 @@ impl Server {
         self.object = Multiplexor::NONE;
     }
 
+    /// Tells whether nothing is transferred.
+    #[inline]
+    pub const fn is_idle(&self) -> bool {
+        matches!(self.transfer, Transfer::Idle)
+    }
+
     /// Tells whether the application has begun to write a domain, so that [`settle`](Self::settle) may
     /// have something to tell it.
     #[inline]
@@ -71,32 +78,15 @@ impl Server {
         }
     }
 
-    /// Returns when time alone changes a running transfer.
-    pub fn deadline_us(&self) -> Option<u64> {
-        match &self.transfer {
-            Transfer::Idle => None,
-            Transfer::Upload(_) => Some(self.deadline_us),
-            Transfer::Download(download) => {
-                let quiet_us = download.block.as_ref().and_then(Block::quiet_us);
-                Some(quiet_us.map_or(self.deadline_us, |us| us.min(self.deadline_us)))
-            }
-        }
-    }
-
     /// Ends a transfer whose client fell silent, or tells the client what is missing: the message
     /// to send about it.
     pub fn expire(&mut self, now_us: u64) -> Option<Message> {
-        let deadline_us = self.deadline_us()?;
-        if now_us < deadline_us {
-            return None;
-        }
-        let mut good = Err(Abort::Timeout);
-        if now_us < self.deadline_us
-            && let Transfer::Download(download) = &mut self.transfer
-            && let Some(block) = &mut download.block
-        {
-            good = block.expire(now_us);
-        }
+        let good = match &mut self.transfer {
+            Transfer::Idle => return None,
+            _ if now_us >= self.deadline_us => Err(Abort::Timeout),
+            Transfer::Upload(_) => return None,
+            Transfer::Download(download) => download.block.as_mut()?.expire(now_us),
+        };
         match good {
             Ok(good) => good.map(acknowledgement),
             Err(abort) => Some(self.abort(abort)),
@@ -117,11 +107,6 @@ impl Server {
         matches!(&self.transfer, Transfer::Upload(upload) if upload.is_streaming())
     }
 
-    /// Tells whether [`segment`](Self::segment) has one.
-    pub fn has_segment(&self) -> bool {
-        matches!(&self.transfer, Transfer::Upload(upload) if upload.has_segment())
-    }
-
     /// Makes the next segment of a block upload: at most one for each that the client asked for.
     pub fn segment(&mut self, objects: &mut Objects<'_>) -> Option<Message> {
         let Transfer::Upload(upload) = &mut self.transfer else {
@@ -130,7 +115,7 @@ impl Server {
         if !upload.has_segment() {
             return None;
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         let segment = upload.next(&mut self.buffer, objects);
         Some(segment.unwrap_or_else(|abort| self.abort(abort)))
     }
@@ -144,7 +129,7 @@ impl Server {
         {
             return self.block_segment(request, objects);
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         match (command >> 5, command & 3) {
             (0, _) => self.download_segment(request, objects),
             (1, _) => self.start_download(request, objects),
@@ -156,15 +141,15 @@ impl Server {
             }
             (5, 0) => self.start_block_upload(request, objects),
             (5, 1) => {
-                self.upload()?.end()?;
+                self.upload()?.0.end()?;
                 self.reset();
                 Ok(())
             }
             (5, 2) => {
-                self.answer = self.upload()?.acknowledge(first, second)?;
+                self.answer = self.upload()?.0.acknowledge(first, second)?;
                 Ok(())
             }
-            (5, 3) => self.upload()?.start(),
+            (5, 3) => self.upload()?.0.start(),
             (6, 0 | 2) => self.start_block_download(request, objects),
             (6, _) => self.end_block_download(request, objects),
             _ => Err(Abort::Command),
@@ -185,9 +170,9 @@ impl Server {
         message(ABORT, object, abort.code().to_le_bytes())
     }
 
-    fn upload(&mut self) -> Result<&mut Upload, Abort> {
+    fn upload(&mut self) -> Result<(&mut Upload, &mut Buffer), Abort> {
         match &mut self.transfer {
-            Transfer::Upload(upload) => Ok(upload),
+            Transfer::Upload(upload) => Ok((upload, &mut self.buffer)),
             _ => Err(Abort::Command),
         }
     }
@@ -214,34 +199,37 @@ impl Server {
 
     fn start_upload(&mut self, request: Message, objects: &mut Objects<'_>) -> Result<(), Abort> {
         self.start(request, objects);
+        let length = self.open_upload(objects)?;
+        self.answer_upload(length, objects)
+    }
+
+    /// Opens the object to be sent, and returns its length.
+    #[inline(never)] // One copy in flash.
+    fn open_upload(&mut self, objects: &mut Objects<'_>) -> Result<u32, Abort> {
         let upload = Upload::open(self.object, &mut self.buffer, objects)?;
-        self.answer_upload(upload, objects)
+        let length = upload.length();
+        self.transfer = Transfer::Upload(upload);
+        Ok(length)
     }
 
     /// Answers with the object itself where it fits, otherwise with its length.
-    fn answer_upload(
-        &mut self,
-        mut upload: Upload,
-        objects: &mut Objects<'_>,
-    ) -> Result<(), Abort> {
-        let length = upload.length();
+    #[inline(never)] // One copy in flash.
+    fn answer_upload(&mut self, length: u32, objects: &mut Objects<'_>) -> Result<(), Abort> {
         if !matches!(length, 1..=4) {
             self.say(0x41, length.to_le_bytes());
-            self.transfer = Transfer::Upload(upload);
             return Ok(());
         }
-        let [a, b, c, d, ..] = upload.first(&mut self.buffer, objects)?;
+        let (upload, buffer) = self.upload()?;
+        let data = upload.first(buffer, objects)?;
         let unused = 4 - length as u8;
-        self.say(0x43 | unused << 2, [a, b, c, d]);
+        self.say(0x43 | unused << 2, data);
         self.reset();
         Ok(())
     }
 
     fn upload_segment(&mut self, command: u8, objects: &mut Objects<'_>) -> Result<(), Abort> {
-        let Transfer::Upload(upload) = &mut self.transfer else {
-            return Err(Abort::Command);
-        };
-        let segment = upload.segment(command, &mut self.buffer, objects)?;
+        let (upload, buffer) = self.upload()?;
+        let segment = upload.segment(command, buffer, objects)?;
         let [flags, ..] = segment;
         if flags & 1 != 0 {
             self.reset();
@@ -258,13 +246,12 @@ impl Server {
         let [command, ..] = request;
         let [size, threshold, ..] = self.start(request, objects);
         check_block_size(size)?;
-        let mut upload = Upload::open(self.object, &mut self.buffer, objects)?;
-        let length = upload.length();
+        let length = self.open_upload(objects)?;
         if threshold > 0 && length <= u32::from(threshold) {
-            return self.answer_upload(upload, objects);
+            return self.answer_upload(length, objects);
         }
+        let (upload, _) = self.upload()?;
         upload.use_blocks(size, command & 4 != 0);
-        self.transfer = Transfer::Upload(upload);
         // A CRC is offered to those who ask for one: others would check one that is not there.
         self.say(0xC2 | command & 4, length.to_le_bytes());
         Ok(())
@@ -297,21 +284,22 @@ impl Server {
         let [command, ..] = request;
         let data = self.start(request, objects);
         let size = (command & 2 != 0).then_some(u32::from_le_bytes(data));
-        self.open_download(size, Some(Block::new(command & 4 != 0)), objects)?;
+        self.open_download(size, Some(command & 4 != 0), objects)?;
         self.say(0xA4, [BLOCK, 0, 0, 0]);
         Ok(())
     }
 
+    /// Opens the object to be received; `blocks` tells whether it comes in blocks, and with a CRC.
     #[inline(never)] // One copy in flash.
     fn open_download(
         &mut self,
         size: Option<u32>,
-        block: Option<Block>,
+        blocks: Option<bool>,
         objects: &mut Objects<'_>,
     ) -> Result<(), Abort> {
         let mut download = Download::open(self.object, size, objects)?;
         self.begun = download.domain.then_some(self.object);
-        download.block = block;
+        download.block = blocks.map(Block::new);
         self.transfer = Transfer::Download(download);
         Ok(())
     }
@@ -340,7 +328,7 @@ impl Server {
             Heard::Forward => {}
             Heard::Acknowledge(good) => self.answer = Some(acknowledgement(good)),
         }
-        self.deadline_us = objects.now_us.saturating_add(TIMEOUT_US);
+        self.deadline_us = after(objects.now_us, TIMEOUT_US);
         Ok(())
     }
 

@@ -78,8 +78,7 @@ impl Upload {
         self.length
     }
 
-    /// Takes the next segment of an upload without blocks: seven bytes, of which the last of the
-    /// object are followed by zeros.
+    /// Returns the first four bytes of an upload without blocks; those behind its end are zeros.
     ///
     /// # Errors
     /// The abort code that ends the transfer.
@@ -87,8 +86,9 @@ impl Upload {
         &mut self,
         buffer: &mut Buffer,
         objects: &mut Objects<'_>,
-    ) -> Result<[u8; SEGMENT], Abort> {
-        self.bytes_at(self.base, buffer, objects)
+    ) -> Result<[u8; 4], Abort> {
+        let [_, a, b, c, d, ..] = self.segment_at(self.base, buffer, objects)?;
+        Ok([a, b, c, d])
     }
 
     /// Makes the segment that is asked for; the last is marked by its lowest bit.
@@ -107,14 +107,15 @@ impl Upload {
         if (command & 0x10 != 0) != self.toggle {
             return Err(Abort::ToggleBit);
         }
-        let bytes = self.bytes_at(self.base, buffer, objects)?;
+        let mut segment = self.segment_at(self.base, buffer, objects)?;
         let rest = self.length.saturating_sub(self.base);
         let unused = SEGMENT as u32 - rest.min(SEGMENT as u32);
         let last = rest <= SEGMENT as u32;
-        let flags = u8::from(self.toggle) << 4 | (unused as u8) << 1 | u8::from(last);
+        let [flags, ..] = &mut segment;
+        *flags = u8::from(self.toggle) << 4 | (unused as u8) << 1 | u8::from(last);
         self.base = self.base.saturating_add(SEGMENT as u32);
         self.toggle = !self.toggle;
-        Ok(segment(flags, bytes))
+        Ok(segment)
     }
 
     /// Sends in blocks of `size` segments from now on, and computes the CRC if asked to.
@@ -150,13 +151,15 @@ impl Upload {
     ) -> Result<Message, Abort> {
         let sequence = self.block.as_ref().map_or(0, |block| block.sequence);
         let at = self.base.saturating_add(bytes_in(sequence));
-        let bytes = self.bytes_at(at, buffer, objects)?;
+        let mut segment = self.segment_at(at, buffer, objects)?;
         let last = self.length.saturating_sub(at) <= SEGMENT as u32;
         let sequence = sequence.saturating_add(1);
         if let Some(block) = &mut self.block {
             block.sequence = sequence;
         }
-        Ok(segment(u8::from(last) << 7 | sequence, bytes))
+        let [first, ..] = &mut segment;
+        *first = u8::from(last) << 7 | sequence;
+        Ok(segment)
     }
 
     /// The client asks for the first block.
@@ -223,14 +226,15 @@ impl Upload {
         block.sequence > 0 && self.base.saturating_add(bytes_in(block.sequence)) >= self.length
     }
 
-    /// Returns the bytes from `at` on, which the application is asked for only once.
+    /// Makes a segment of the bytes from `at` on, which the application is asked for only once. What
+    /// says which segment it is comes first, and is left to be set.
     #[inline(never)] // One copy in flash.
-    fn bytes_at(
+    fn segment_at(
         &mut self,
         at: u32,
         buffer: &mut Buffer,
         objects: &mut Objects<'_>,
-    ) -> Result<[u8; SEGMENT], Abort> {
+    ) -> Result<Message, Abort> {
         let carried = self.length.saturating_sub(at).min(SEGMENT as u32) as usize;
         let start = at as usize % SDO_BUFFER;
         let slot = buffer
@@ -251,11 +255,11 @@ impl Upload {
                 crc.update(slot);
             }
         }
-        let mut bytes = [0; SEGMENT];
-        for (to, from) in bytes.iter_mut().zip(slot) {
+        let mut segment = [0; 8];
+        for (to, from) in segment.iter_mut().skip(1).zip(slot) {
             *to = *from;
         }
-        Ok(bytes)
+        Ok(segment)
     }
 }
 
@@ -274,9 +278,4 @@ pub(super) fn check_block_size(size: u8) -> Result<(), Abort> {
 /// Returns how many bytes full segments carry.
 fn bytes_in(segments: u8) -> u32 {
     u32::from(segments) * SEGMENT as u32
-}
-
-fn segment(first: u8, bytes: [u8; SEGMENT]) -> Message {
-    let [a, b, c, d, e, f, g] = bytes;
-    [first, a, b, c, d, e, f, g]
 }

@@ -1,4 +1,4 @@
-//! What a vertebra must know of an entry to serve it, without the words for people: twelve bytes an
+//! What a vertebra must know of an entry to serve it, without the words for people: five bytes an
 //! entry, made from [`OBJECTS`] by the compiler, so that names and descriptions stay out of the image.
 
 use eel_canopen::{Abort, Access, Entry};
@@ -26,30 +26,73 @@ pub struct Served {
     pub access: Access,
     /// Which PDO may carry it.
     pub pdo: Pdo,
-    /// The least raw number.
-    min: i32,
-    /// The greatest raw number.
-    max: u32,
+    /// The place of its bounds in [`BOUNDS`].
+    bounds: u8,
+}
+
+/// The least and the greatest raw number.
+type Bounds = (i32, u32);
+
+/// Every pair of bounds once, and how many there are.
+const ALL_BOUNDS: ([Bounds; ENTRIES], usize) = {
+    let (mut all, mut count) = ([(0, 0); ENTRIES], 0);
+    let mut place = 0;
+    while place < OBJECTS.len() {
+        let mut sub = 0;
+        while sub < OBJECTS[place].subs.len() {
+            let bounds = bounds(&OBJECTS[place].subs[sub]);
+            if position(&all, bounds) >= count {
+                all[count] = bounds;
+                count += 1;
+            }
+            sub += 1;
+        }
+        place += 1;
+    }
+    (all, count)
+};
+
+/// Every pair of bounds: many entries have the same.
+static BOUNDS: [Bounds; ALL_BOUNDS.1] = *ALL_BOUNDS.0.first_chunk().unwrap();
+
+/// Returns where bounds are in a list; its length where they aren't.
+const fn position(all: &[Bounds; ENTRIES], bounds: Bounds) -> usize {
+    let mut place = 0;
+    while place < ENTRIES && !(all[place].0 == bounds.0 && all[place].1 == bounds.1) {
+        place += 1;
+    }
+    place
+}
+
+/// Returns the bounds of an entry.
+const fn bounds(sub: &Sub) -> Bounds {
+    assert!(sub.min >= i32::MIN as i64 && sub.min <= i32::MAX as i64);
+    assert!(sub.max >= 0 && sub.max <= u32::MAX as i64);
+    assert!(sub.data_type.is_signed() || sub.min >= 0);
+    (sub.min as i32, sub.max as u32)
 }
 
 impl Served {
     const fn new(sub: &Sub) -> Self {
-        assert!(sub.min >= i32::MIN as i64 && sub.min <= i32::MAX as i64);
-        assert!(sub.max >= 0 && sub.max <= u32::MAX as i64);
-        assert!(sub.data_type.is_signed() || sub.min >= 0);
         Self {
             field: sub.field,
             data_type: sub.data_type,
             access: sub.access,
             pdo: sub.pdo,
-            min: sub.min as i32,
-            max: sub.max as u32,
+            bounds: position(&ALL_BOUNDS.0, bounds(sub)) as u8,
         }
     }
 
     /// Returns the least and the greatest raw number.
-    pub const fn bounds(&self) -> (i64, i64) {
-        (self.min as i64, self.max as i64)
+    pub fn bounds(&self) -> (i64, i64) {
+        let (min, max) = self.least_and_greatest();
+        (i64::from(min), i64::from(max))
+    }
+
+    #[inline]
+    fn least_and_greatest(&self) -> Bounds {
+        let bounds = BOUNDS.get(usize::from(self.bounds));
+        bounds.copied().unwrap_or_default()
     }
 
     /// Returns what a CANopen node must know of the entry.
@@ -76,16 +119,13 @@ impl Served {
         }
         // In 32 bits, which is half the instructions.
         let raw = self.data_type.decode(bytes)? as u32;
+        let (min, max) = self.least_and_greatest();
         let (low, high, value) = if self.data_type.is_signed() {
             let value = raw.cast_signed();
-            let high = value > self.max.cast_signed();
-            (value < self.min, high, i64::from(value))
+            let high = value > max.cast_signed();
+            (value < min, high, i64::from(value))
         } else {
-            (
-                raw < self.min.cast_unsigned(),
-                raw > self.max,
-                i64::from(raw),
-            )
+            (raw < min.cast_unsigned(), raw > max, i64::from(raw))
         };
         if low {
             Err(Abort::ValueTooLow)
