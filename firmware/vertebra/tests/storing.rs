@@ -101,6 +101,45 @@ fn nothing_is_stored_while_motors_are_live() {
     assert_eq!(bench.state(), State::StopOff);
 }
 
+/// A head that saves and resets in one breath, and a flash that takes its time.
+#[test]
+fn what_was_asked_for_is_stored_even_if_a_reset_follows_at_once() {
+    for command in [NmtCommand::ResetNode, NmtCommand::ResetCommunication] {
+        for ticks in [0, 30] {
+            let mut bench = Bench::ready();
+            bench.maintain();
+            change(&mut bench, 123_456, 500);
+            let request = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+            let save = Frame::standard(0x600 + u16::from(NODE), &request).unwrap();
+            let reset = Frame::standard(0, &[command as u8, 0]).unwrap();
+            let now = bench.now();
+            bench.vertebra.handle_frame(now, &save);
+            let early = (ticks > 0).then(|| bench.vertebra.poll_store().unwrap());
+            bench.vertebra.handle_frame(now, &reset);
+            for _ in 0..ticks {
+                bench.tick();
+            }
+            let record = early.unwrap_or_else(|| bench.vertebra.poll_store().unwrap());
+            bench.store.save(&record).unwrap();
+            let now = bench.now();
+            bench.vertebra.finish_store(now, Ok(()));
+            bench.nmt(NmtCommand::ResetNode);
+            bench.run(2);
+            assert_eq!(
+                held(&mut bench),
+                (123_456, 500),
+                "{command:?}, {ticks} ticks"
+            );
+            bench.power_cycle(prototype());
+            assert_eq!(
+                held(&mut bench),
+                (123_456, 500),
+                "{command:?}, {ticks} ticks"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_flash_that_fails_is_told_and_the_old_settings_stay() {
     let mut bench = Bench::ready();

@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::{Node, Waiting};
 use crate::lss::{self, Outcome};
 use crate::stored;
-use crate::{Abort, Application, Event, NmtCommand, NmtState, STORED_PARAMETERS, StoreRequest};
+use crate::{Abort, Application, Event, NmtCommand, NmtState, StoreRequest};
 
 /// How long a client waits for something to be stored.
 const STORE_TIMEOUT_US: u64 = 1_000_000;
@@ -28,14 +28,18 @@ impl Node {
         self.stored_refused
     }
 
-    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not.
+    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not. What is done comes with
+    /// the parameters of the communication area as they were [saved](Self::save_parameters), which may have
+    /// changed since; where none were to be saved they are not looked at.
     #[inline(never)] // One copy in flash, and a small one.
-    pub fn finish_store(&mut self, now_us: u64, outcome: Result<(), Abort>) {
+    pub fn finish_store(&mut self, now_us: u64, outcome: Result<&[u8], Abort>) {
         self.expire_store(now_us);
         let request = self.storing.take();
-        if outcome.is_ok() {
+        if let Ok(saved) = outcome {
             match request {
-                Some(StoreRequest::Save(group)) if group.has_communication() => self.keep(),
+                Some(StoreRequest::Save(group)) if group.has_communication() => {
+                    self.stored = Vec::from_slice(saved).unwrap_or_default();
+                }
                 Some(StoreRequest::Restore(group)) if group.has_communication() => {
                     self.stored.clear();
                 }
@@ -45,7 +49,7 @@ impl Node {
         }
         match self.waiting.take() {
             Some(Waiting::Sdo { answer, .. }) => {
-                let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
+                let answer = outcome.map_or_else(|abort| refusal(request, abort), |_| answer);
                 self.answer(answer);
             }
             Some(Waiting::Lss) => self.answer_lss(&lss::stored(outcome.is_ok())),
@@ -64,6 +68,13 @@ impl Node {
         }
     }
 
+    /// Has no SDO client wait any more for something to be stored.
+    pub(super) fn leave_unanswered(&mut self) {
+        if let Some(Waiting::Sdo { .. }) = self.waiting {
+            self.waiting = None;
+        }
+    }
+
     /// Tells an SDO client that storing takes too long.
     pub(super) fn expire_store(&mut self, now_us: u64) {
         if let Some(Waiting::Sdo { deadline_us, .. }) = self.waiting
@@ -72,13 +83,6 @@ impl Node {
             self.waiting = None;
             self.answer(refusal(self.storing, Abort::Hardware));
         }
-    }
-
-    /// Takes the parameters as they are for those after the next reset.
-    fn keep(&mut self) {
-        let mut bytes = [0; STORED_PARAMETERS];
-        let length = self.save_parameters(&mut bytes).unwrap_or(0);
-        self.stored = Vec::from_slice(bytes.get(..length).unwrap_or(&[])).unwrap_or_default();
     }
 
     /// Starts the node anew.
