@@ -267,6 +267,7 @@ impl Vertebra {
             }
         }
         self.core.operational = state == NmtState::Operational;
+        self.core.arrived = None;
         match command {
             NmtCommand::Stop => self.core.latch_stop(),
             _ if !self.core.operational => self.core.stop(Emergency::STOPPED_BY_NMT, 0),
