@@ -225,7 +225,7 @@ impl Application for Served<'_> {
     }
 
     fn may_configure(&self) -> Result<(), Abort> {
-        if self.core.machine.is_live() {
+        if self.core.machine.may_carry_current(self.core.now) {
             return Err(Abort::DeviceState);
         }
         Ok(())
