@@ -1,12 +1,14 @@
 //! The node: frames and time in, frames and events out.
 
+mod identifiers;
 mod process_data;
 mod setup;
 
 use heapless::Vec;
 
+pub use identifiers::Identifiers;
+
 use crate::communication::Communication;
-use crate::config::PDOS;
 use crate::emergency::Fault;
 use crate::lss::{self, Lss};
 use crate::objects::Objects;
@@ -18,9 +20,6 @@ use crate::{
     Application, Config, Event, EventQueue, Frame, NmtCommand, NmtState, STORED_PARAMETERS,
     StoreRequest,
 };
-
-/// The identifiers that a node listens to.
-pub type Identifiers = Vec<u16, { 6 + PDOS }>;
 
 /// How many events wait to be polled.
 const EVENTS: usize = 16;
@@ -214,32 +213,6 @@ impl Node {
     /// Returns the node id.
     pub const fn node_id(&self) -> u8 {
         self.config.node_id
-    }
-
-    /// Returns the identifiers that the node listens to, for a controller's filters. They change with the
-    /// parameters of the communication area, the state of LSS, and at a reset.
-    pub fn identifiers(&self) -> Identifiers {
-        let communication = &self.communication;
-        let mut identifiers = Vec::new();
-        let mut hear = |cob_id| {
-            // As many as there can be.
-            let _ = identifiers.push(cob_id);
-        };
-        hear(lss::REQUEST);
-        if self.state == NmtState::Initialising {
-            return identifiers;
-        }
-        hear(0);
-        hear(communication.sync.cob_id());
-        communication.time.cob_id().into_iter().for_each(&mut hear);
-        let watched = communication.consumer.node().map(heartbeat_cob_id);
-        watched.into_iter().for_each(&mut hear);
-        hear(0x600 + u16::from(self.config.node_id));
-        let rpdos = communication.rpdos.iter().map(|rpdo| &rpdo.parameters);
-        rpdos
-            .filter(|parameters| parameters.is_enabled())
-            .for_each(|parameters| hear(parameters.cob_id()));
-        identifiers
     }
 
     /// Returns object 0x1001, the error register.

@@ -60,9 +60,13 @@ impl fmt::Display for Sdo<'_> {
             (Side::Request, 0) | (Side::Response, 0) => self.segment(out, command),
             (Side::Request, 3) | (Side::Response, 1) => write!(out, "segment, please go on"),
             (Side::Request, 5) => read_in_blocks(out, object, command, low, [a, b, c, d]),
-            (Side::Request, 6) => write_in_blocks(out, object, command, [low, high], [a, b, c, d]),
+            (Side::Request, 6) => {
+                send_in_blocks(out, "write", object, command, [low, high], [a, b, c, d])
+            }
             (Side::Response, 5) => take_in_blocks(out, object, command, [low, high], a),
-            (Side::Response, 6) => give_in_blocks(out, object, command, [low, high], [a, b, c, d]),
+            (Side::Response, 6) => {
+                send_in_blocks(out, "answer", object, command, [low, high], [a, b, c, d])
+            }
             _ => write!(out, "unknown command 0x{command:02X}"),
         }
     }
@@ -120,19 +124,27 @@ fn read_in_blocks(
     }
 }
 
-/// A client that downloads in blocks.
-fn write_in_blocks(
+/// A side that sends blocks: a client that writes, or a server that answers.
+fn send_in_blocks(
     out: &mut fmt::Formatter<'_>,
+    verb: &str,
     object: Object,
     command: u8,
     crc: [u8; 2],
     size: [u8; 4],
 ) -> fmt::Result {
     if command & 1 != 0 {
-        return end_of_blocks(out, command, crc);
+        let (unused, crc) = (command >> 2 & 7, u16::from_le_bytes(crc));
+        return write!(
+            out,
+            "blocks end, {unused} bytes of the last segment unused, CRC 0x{crc:04X}"
+        );
     }
-    write!(out, "write {object} in blocks")?;
-    size_in_blocks(out, command, size)
+    write!(out, "{verb} {object} in blocks")?;
+    if command & 2 == 0 {
+        return Ok(());
+    }
+    write!(out, ", {} bytes", u32::from_le_bytes(size))
 }
 
 /// A server that takes blocks.
@@ -151,36 +163,6 @@ fn take_in_blocks(
             "block received up to segment {received}, next of {next} segments"
         ),
     }
-}
-
-/// A server that gives blocks.
-fn give_in_blocks(
-    out: &mut fmt::Formatter<'_>,
-    object: Object,
-    command: u8,
-    crc: [u8; 2],
-    size: [u8; 4],
-) -> fmt::Result {
-    if command & 1 != 0 {
-        return end_of_blocks(out, command, crc);
-    }
-    write!(out, "answer {object} in blocks")?;
-    size_in_blocks(out, command, size)
-}
-
-fn size_in_blocks(out: &mut fmt::Formatter<'_>, command: u8, size: [u8; 4]) -> fmt::Result {
-    if command & 2 == 0 {
-        return Ok(());
-    }
-    write!(out, ", {} bytes", u32::from_le_bytes(size))
-}
-
-fn end_of_blocks(out: &mut fmt::Formatter<'_>, command: u8, crc: [u8; 2]) -> fmt::Result {
-    let (unused, crc) = (command >> 2 & 7, u16::from_le_bytes(crc));
-    write!(
-        out,
-        "blocks end, {unused} bytes of the last segment unused, CRC 0x{crc:04X}"
-    )
 }
 
 /// An object with its name.

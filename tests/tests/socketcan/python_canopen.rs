@@ -302,12 +302,15 @@ fn a_running_vertebra_lets_go_when_the_head_falls_silent_and_knows_when() {
     // A host that stands still for 90 ms loses targets too, and gets another try.
     let lost_targets = |found: &Value| found["emergencies"].to_string().contains("\"5082");
     let Some(name) = interface() else { return };
-    let found = (0..3)
+    let found = (0..5)
         .map(|_| meet_dissected(Nodes::start(&name, ids(&[3])), &name, "safe.py"))
         .find(|found| !lost_targets(found))
         .expect("a host that does not stand still");
     let (off, ready, run, stop_damped, stop_brake) = (1, 2, 3, 7, 8);
-    assert_eq!(found["running"], json!([off, ready, run]));
+    // Off is over before the first report where the host was slow.
+    let running = &found["running"];
+    let ways = [json!([off, ready, run]), json!([ready, run])];
+    assert!(ways.contains(running), "{running}");
     // A host that stands still for less is told of late targets, and that they are back.
     let emergencies = found["emergencies"].as_array().unwrap().iter();
     let is_late = |it: &&Value| {
@@ -336,7 +339,7 @@ fn a_running_vertebra_lets_go_when_the_head_falls_silent_and_knows_when() {
 /// still for too long gets another try.
 fn nod(interface: &str, picture: &Path) -> (f64, f64) {
     let example = root().join("examples/python/nod.py");
-    for _ in 0..3 {
+    for _ in 0..5 {
         let vertebrae = Nodes::start(interface, vec![NodeId::new(3).unwrap()]);
         let report = python(&example, &[interface, picture.to_str().unwrap()]);
         assert_eq!(vertebrae.end().dropped, 0);
