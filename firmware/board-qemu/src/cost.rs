@@ -2,7 +2,7 @@
 
 use core::hint::black_box;
 
-use eel_canopen::{Config, Event, Frame, Mapped, Node, PdoDefault};
+use eel_canopen::{Config, Event, Frame, Mapped, Node, PdoDefault, STORED_PARAMETERS};
 
 use crate::stopwatch::Stopwatch;
 use crate::values::{Values, config};
@@ -142,7 +142,10 @@ impl<'a> Bench<'a> {
     pub fn store(&mut self) {
         while let Some(event) = self.node.poll_event() {
             if let Event::Store(_) = event {
-                self.node.finish_store(self.now_us, Ok(()));
+                let mut bytes = [0; STORED_PARAMETERS];
+                let length = self.node.save_parameters(&mut bytes).unwrap_or_default();
+                let saved = bytes.get(..length).unwrap_or_default();
+                self.node.finish_store(self.now_us, Ok(saved));
             }
         }
     }

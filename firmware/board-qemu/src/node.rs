@@ -46,7 +46,7 @@ mod image {
                 let parameters = black_box::<&mut [u8]>(&mut []);
                 black_box(node.save_parameters(parameters));
                 let outcome = if black_box(true) {
-                    Ok(())
+                    Ok(black_box::<&[u8]>(&[]))
                 } else {
                     Err(Abort::Hardware)
                 };

@@ -28,8 +28,8 @@ pub enum Event {
         /// Milliseconds since midnight.
         ms: u32,
     },
-    /// Parameters or the node id are to be stored. Whoever has done it, or can't, calls
-    /// [`Node::finish_store`](crate::Node::finish_store); until then the client waits.
+    /// Parameters, as they are at this moment, or the node id are to be stored. Whoever has done it,
+    /// or can't, calls [`Node::finish_store`](crate::Node::finish_store); until then the client waits.
     Store(StoreRequest),
     /// LSS gave an unconfigured node its id, with which it has just booted, or a reset of the
     /// communication took over one that LSS had given.

@@ -334,6 +334,7 @@ impl Node {
         }
         if state == NmtState::Stopped {
             self.sdo.reset();
+            self.leave_unanswered();
             self.transmit
                 .keep_only(heartbeat_cob_id(self.config.node_id));
         }
@@ -378,6 +379,8 @@ impl Node {
     #[inline(never)] // One copy in flash.
     fn serve(&mut self, now_us: u64, data: &[u8], app: &mut dyn Application) {
         let Ok(request) = data.try_into() else { return };
+        // Whoever says something else no longer waits, and would take the answer for another one.
+        self.leave_unanswered();
         let Self {
             config,
             communication,

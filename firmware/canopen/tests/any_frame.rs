@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Bench, CONFIG, ID};
-use eel_canopen::{Abort, Event, Frame, NmtState, Node};
+use eel_canopen::{Abort, Event, Frame, NmtState, Node, STORED_PARAMETERS};
 
 /// Frames in one run; `CANOPEN_FRAMES` asks for more.
 const FRAMES: u32 = 200_000;
@@ -156,7 +156,7 @@ fn disturb(bench: &mut Bench, random: &mut Random) -> usize {
         3 => bench.app.refuse = !bench.app.refuse,
         4..=6 => {
             let outcome = random.pick(&[Ok(()), Ok(()), Err(Abort::Hardware)]);
-            bench.node.finish_store(bench.now_us, outcome);
+            finish(bench, outcome);
         }
         _ => {}
     }
@@ -168,13 +168,21 @@ fn disturb(bench: &mut Bench, random: &mut Random) -> usize {
     }
 }
 
+/// Ends what the node asked to be stored.
+fn finish(bench: &mut Bench, outcome: Result<(), Abort>) {
+    let mut bytes = [0; STORED_PARAMETERS];
+    let length = bench.node.save_parameters(&mut bytes).unwrap();
+    let outcome = outcome.map(|()| &bytes[..length]);
+    bench.node.finish_store(bench.now_us, outcome);
+}
+
 /// Gives the node its id and its defaults back, whatever LSS and SDO have made of them.
 fn restore(bench: &mut Bench) {
     let lss = |bench: &mut Bench, command: u8, value: u8| {
         bench.hear(0x7E5, &[command, value, 0, 0, 0, 0, 0, 0]);
-        bench.node.finish_store(bench.now_us, Ok(()));
+        finish(bench, Ok(()));
     };
-    bench.node.finish_store(bench.now_us, Ok(()));
+    finish(bench, Ok(()));
     for (command, value) in [(0x04, 1), (0x11, ID), (0x17, 0), (0x04, 0)] {
         lss(bench, command, value);
     }
@@ -183,7 +191,7 @@ fn restore(bench: &mut Bench) {
     bench.sent();
     let load = [0x23, 0x11, 0x10, 1, b'l', b'o', b'a', b'd'];
     bench.hear(0x605, &load);
-    bench.node.finish_store(bench.now_us, Ok(()));
+    finish(bench, Ok(()));
     assert_eq!(
         bench.sent(),
         [(0x585, vec![0x60, 0x11, 0x10, 1, 0, 0, 0, 0])]

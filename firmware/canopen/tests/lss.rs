@@ -205,7 +205,7 @@ fn the_id_is_stored_by_whoever_has_the_flash_and_then_outlives_a_reset() {
     byte(&mut bench, 0x11, 4);
     assert_eq!(byte(&mut bench, 0x17, 0), [], "nothing is promised yet");
     assert_eq!(bench.events(), [Event::Store(StoreRequest::NodeId(4))]);
-    bench.node.finish_store(bench.now_us, Ok(()));
+    bench.node.finish_store(bench.now_us, Ok(&[]));
     assert_eq!(bench.sent(), answer([0x17, 0, 0, 0, 0, 0, 0, 0]));
     byte(&mut bench, 0x04, 0);
     assert_eq!(bench.ask(0, &[129, 0]), [(0x704, vec![0])]);

@@ -17,10 +17,24 @@ fn store(bench: &mut Bench, index: u16, subindex: u8, outcome: Result<(), Abort>
     let [a, b, c, d] = if index == 0x1010 { SAVE } else { LOAD }.to_le_bytes();
     let asked = bench.ask(0x605, &[0x23, low, high, subindex, a, b, c, d]);
     assert_eq!(asked, [], "nothing is promised yet");
+    let saved = parameters(bench);
+    let outcome = outcome.map(|()| saved.as_slice());
     bench.node.finish_store(bench.now_us, outcome);
     let mut sent = bench.sent();
     assert_eq!(sent.len(), 1);
     sent.remove(0).1
+}
+
+/// Returns the request to save everything.
+fn save_all() -> [u8; 8] {
+    let [a, b, c, d] = SAVE.to_le_bytes();
+    [0x23, 0x10, 0x10, 1, a, b, c, d]
+}
+
+/// Tells the node that it is done.
+fn finish(bench: &mut Bench) {
+    let saved = parameters(bench);
+    bench.node.finish_store(bench.now_us, Ok(&saved));
 }
 
 fn parameters(bench: &Bench) -> Vec<u8> {
@@ -203,16 +217,74 @@ fn one_thing_is_stored_at_a_time_and_not_for_ever() {
     let [a, b, c, d] = SAVE.to_le_bytes();
     let save = [0x23, 0x10, 0x10, 2, a, b, c, d];
     assert_eq!(bench.ask(0x605, &save), []);
-    assert_eq!(bench.write(0x1011, 1, LOAD, 4), Err(0x0800_0022));
     bench.pass_ms(999);
     bench.sent();
     bench.pass_ms(1);
     let timeout = (0x585, vec![0x80, 0x10, 0x10, 2, 0, 0, 0x06, 0x06]);
     assert!(bench.sent().contains(&timeout));
+    assert_eq!(bench.write(0x1011, 1, LOAD, 4), Err(0x0800_0022));
     // The flash ends late, without a word, and the next one may come.
-    bench.node.finish_store(bench.now_us, Ok(()));
+    finish(&mut bench);
     assert_eq!(bench.sent(), []);
     assert_eq!(bench.ask(0x605, &save), []);
+}
+
+#[test]
+fn a_node_that_was_stopped_does_not_answer_when_all_is_stored() {
+    for late in [false, true] {
+        let mut bench = Bench::pre_operational();
+        assert_eq!(bench.ask(0x605, &save_all()), []);
+        bench.ask(0, &[2, 0]);
+        if late {
+            bench.pass_ms(1_500);
+        }
+        finish(&mut bench);
+        let sent = bench.sent();
+        assert!(sent.iter().all(|(cob_id, _)| *cob_id == 0x705), "{sent:?}");
+        bench.ask(0, &[128, 0]);
+        bench.pass_ms(1_500);
+        let sent = bench.sent();
+        assert!(sent.iter().all(|(cob_id, _)| *cob_id == 0x705), "{sent:?}");
+    }
+}
+
+#[test]
+fn a_client_that_no_longer_waits_is_not_answered() {
+    for request in [
+        [0x80, 0x10, 0x10, 1, 0, 0, 0x04, 0x05],
+        [0x40, 0x17, 0x10, 0, 0, 0, 0, 0],
+    ] {
+        for late in [false, true] {
+            let mut bench = Bench::pre_operational();
+            assert_eq!(bench.ask(0x605, &save_all()), []);
+            bench.ask(0x605, &request);
+            if late {
+                bench.pass_ms(1_500);
+            }
+            finish(&mut bench);
+            let sent = bench.sent();
+            assert!(sent.iter().all(|(cob_id, _)| *cob_id != 0x585), "{sent:?}");
+        }
+    }
+}
+
+#[test]
+fn what_was_asked_for_is_kept_whatever_happens_before_the_flash_is_done() {
+    for reset in [None, Some(130), Some(129)] {
+        let mut bench = Bench::pre_operational();
+        change(&mut bench);
+        let changed = readings(&mut bench);
+        assert_eq!(bench.ask(0x605, &save_all()), []);
+        let saved = parameters(&bench);
+        match reset {
+            Some(reset) => drop(bench.ask(0, &[reset, 0])),
+            None => assert_eq!(bench.write(0x1017, 0, 444, 2), Ok(())),
+        }
+        bench.node.finish_store(bench.now_us, Ok(&saved));
+        bench.ask(0, &[130, 0]);
+        assert_eq!(readings(&mut bench), changed, "{reset:?}");
+        assert_eq!(bench.node.stored_parameters(), saved);
+    }
 }
 
 #[test]

@@ -46,6 +46,8 @@ pub(crate) struct Core {
     pub motion: Option<Motion>,
     pub pose: Pose,
     pub target: ReceivedTarget,
+    /// The identifier of a target that waits for SYNC.
+    pub arrived: Option<u16>,
     pub feed_forward: FeedForward,
     pub received_feed: FeedForward,
     pub status: Status,
@@ -94,6 +96,7 @@ impl Core {
             motion: None,
             pose: Pose::default(),
             target: ReceivedTarget::default(),
+            arrived: None,
             feed_forward: FeedForward::NEUTRAL,
             received_feed: FeedForward::NEUTRAL,
             status: Status::NONE,

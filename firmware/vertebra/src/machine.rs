@@ -62,19 +62,24 @@ impl Machine {
         self.faulty_motor
     }
 
-    /// Tells whether a fault finds, or an emergency stop has left, all bridges off.
-    pub const fn is_free(&self) -> bool {
-        self.free
-    }
-
     /// Tells whether a stop is still slowing the wrist down.
     pub const fn is_stopping(&self) -> bool {
         matches!(self.state, State::StopDamped | State::StopBrake)
     }
 
-    /// Tells whether a motor may carry current: enabled, or stopping.
+    /// Tells whether all motors may carry current: enabled, or stopping.
     pub const fn is_live(&self) -> bool {
         self.is_enabled() || self.is_stopping()
+    }
+
+    /// Tells whether the motors that are not at fault brake after a fault.
+    pub fn brakes_after_fault(&self, now: Instant) -> bool {
+        self.state == State::Fault && !self.free && self.elapsed(now) < STOP_BRAKE
+    }
+
+    /// Tells whether a motor may carry current.
+    pub fn may_carry_current(&self, now: Instant) -> bool {
+        self.is_live() || self.brakes_after_fault(now)
     }
 
     /// Tells whether the wrist does what the head asks of it.

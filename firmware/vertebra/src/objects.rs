@@ -176,7 +176,7 @@ impl Core {
 
     /// Writes a setting, which is refused while a motor may carry current, and in Operational.
     fn set_setting(&mut self, field: Field, value: i64) -> Result<(), Abort> {
-        if self.machine.is_live() || self.operational {
+        if self.machine.may_carry_current(self.now) || self.operational {
             return Err(Abort::DeviceState);
         }
         if !self.settings.set(field, value) {

@@ -9,7 +9,7 @@ use crate::command::TARGET_TIMEOUT;
 use crate::core::Core;
 use crate::encoder::Encoder;
 use crate::io::{Drive, Sample};
-use crate::machine::{STOP_BRAKE, STOP_DAMPED};
+use crate::machine::STOP_DAMPED;
 use crate::workspace::is_believable;
 
 /// Ticks for which a current may be above its hard limit.
@@ -265,7 +265,7 @@ impl Core {
     /// Returns the drives of a fault: the motor at fault is off, the others brake, then all off.
     /// What was off before the fault stays off.
     pub fn fault_drives(&self) -> [Drive; 3] {
-        if self.machine.is_free() || self.machine.elapsed(self.now) >= STOP_BRAKE {
+        if !self.machine.brakes_after_fault(self.now) {
             return [Drive::Off; 3];
         }
         let mut drives = [Drive::Brake; 3];

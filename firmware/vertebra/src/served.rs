@@ -147,12 +147,17 @@ impl Application for Served<'_> {
 
     fn rpdo_applied(&mut self, number: u8, cob_id: u16) {
         match number {
-            1 => {
-                let bytes = self.core.target.to_bytes();
-                self.core.receive_target(&bytes, cob_id);
-            }
+            // It waits for SYNC even where RPDO1 is event-driven: the path is made of one target for each.
+            1 => self.core.arrived = Some(cob_id),
             2 => self.core.receive_feed_forward(),
             _ => {}
+        }
+    }
+
+    fn synchronised(&mut self, _: Option<u8>) {
+        if let Some(cob_id) = self.core.arrived.take() {
+            let bytes = self.core.target.to_bytes();
+            self.core.receive_target(&bytes, cob_id);
         }
     }
 
@@ -220,7 +225,7 @@ impl Application for Served<'_> {
     }
 
     fn may_configure(&self) -> Result<(), Abort> {
-        if self.core.machine.is_live() {
+        if self.core.machine.may_carry_current(self.core.now) {
             return Err(Abort::DeviceState);
         }
         Ok(())

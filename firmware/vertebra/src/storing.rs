@@ -8,10 +8,10 @@ use crate::store::{Record, StoreError};
 use crate::vertebra::Vertebra;
 
 impl Vertebra {
-    /// Returns what the platform shall store now, once for each request; it then calls
-    /// [`finish_store`](Self::finish_store), before or after other turns. The bus waits for a second.
-    pub fn poll_store(&mut self) -> Option<Record> {
-        let request = self.storing.asked.take()?;
+    /// Makes what is to be stored of what is there at this moment: it may change before the platform is
+    /// ready to store it.
+    #[inline(never)] // One copy in flash.
+    pub(crate) fn prepare_store(&mut self, request: StoreRequest) {
         let mut record = self.storing.stored.clone();
         match request {
             StoreRequest::Save(group) => {
@@ -42,8 +42,17 @@ impl Vertebra {
             StoreRequest::NodeId(_) => false,
         };
         record.lost = self.core.settings_lost && !is_mended;
-        self.storing.coming = Some(record.clone());
-        Some(record)
+        self.storing.coming = Some(record);
+        self.storing.is_taken = false;
+    }
+
+    /// Returns what the platform shall store now, once for each request; it then calls
+    /// [`finish_store`](Self::finish_store), before or after other turns. The bus waits for a second.
+    pub fn poll_store(&mut self) -> Option<Record> {
+        if core::mem::replace(&mut self.storing.is_taken, true) {
+            return None;
+        }
+        self.storing.coming.clone()
     }
 
     /// Hears what became of what [`poll_store`](Self::poll_store) returned, and answers the bus. What is
@@ -56,9 +65,10 @@ impl Vertebra {
             self.core.settings_lost = record.lost;
             self.storing.stored = record;
         }
-        let outcome = outcome.map_err(|error| match error {
-            StoreError::Flash | StoreError::Verify => Abort::Hardware,
-        });
+        let outcome = match outcome {
+            Ok(()) => Ok(self.storing.stored.communication.as_slice()),
+            Err(StoreError::Flash | StoreError::Verify) => Err(Abort::Hardware),
+        };
         self.node.finish_store(now.to_micros(), outcome);
     }
 }

@@ -1,6 +1,6 @@
 //! The vertebra as its platform sees it.
 
-use eel_canopen::{Config, Frame, Identifiers, Identity, NmtCommand, NmtState, Node, StoreRequest};
+use eel_canopen::{Config, Frame, Identifiers, Identity, NmtCommand, NmtState, Node};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
 use eel_protocol::freeze::TimeOfDay;
@@ -35,10 +35,10 @@ pub struct Vertebra {
 pub(crate) struct Storing {
     /// What is stored.
     pub stored: Record,
-    /// What the bus has asked for, and the platform has not taken yet.
-    pub asked: Option<StoreRequest>,
-    /// What the platform is about to store.
+    /// What the bus has asked for, until it is stored.
     pub coming: Option<Record>,
+    /// Whether the platform has taken it.
+    pub is_taken: bool,
 }
 
 /// Does one turn: all frames in their order, the sample, then what is to be sent, at most `room`
@@ -234,7 +234,7 @@ impl Vertebra {
                         told: now,
                     });
                 }
-                eel_canopen::Event::Store(request) => self.storing.asked = Some(request),
+                eel_canopen::Event::Store(request) => self.prepare_store(request),
                 eel_canopen::Event::NodeId(id) => {
                     self.core.events.push(Event::NodeId(NodeId::new(id)));
                 }
@@ -267,6 +267,7 @@ impl Vertebra {
             }
         }
         self.core.operational = state == NmtState::Operational;
+        self.core.arrived = None;
         match command {
             NmtCommand::Stop => self.core.latch_stop(),
             _ if !self.core.operational => self.core.stop(Emergency::STOPPED_BY_NMT, 0),

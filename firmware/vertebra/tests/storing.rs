@@ -4,9 +4,9 @@ use eel_canopen::{Frame, NmtCommand};
 use eel_protocol::emergency::Emergency;
 use eel_protocol::{Condition, Mode, NodeId, State, identity};
 use eel_vertebra::store::{RAM_PAGE, StoreError, Stored};
-use eel_vertebra::{Event, Settings};
+use eel_vertebra::{Drive, Event, Settings};
 
-use support::{Bench, NODE, node};
+use support::{Bench, NODE, faulty, node};
 
 mod support;
 
@@ -99,6 +99,65 @@ fn nothing_is_stored_while_motors_are_live() {
     bench.until(State::StopOff, 3_000);
     assert_eq!(save(&mut bench, 1), Ok(()));
     assert_eq!(bench.state(), State::StopOff);
+}
+
+/// The motors that are not at fault brake for two seconds.
+#[test]
+fn nothing_is_stored_or_set_while_a_fault_still_brakes() {
+    let mut bench = faulty();
+    bench.nmt(NmtCommand::EnterPreOperational);
+    bench.run(2);
+    let (index, subindex) = STIFFNESS;
+    while bench.drives.contains(&Drive::Brake) {
+        assert_eq!(bench.state(), State::Fault);
+        assert_eq!(save(&mut bench, 1), Err(DEVICE_STATE));
+        assert_eq!(bench.download(0x1016, 1, &[0; 4]), Err(DEVICE_STATE));
+        let refused = bench.download(index, subindex, &5_000u32.to_le_bytes());
+        assert_eq!(refused, Err(DEVICE_STATE));
+        bench.run(100);
+    }
+    assert_eq!(bench.state(), State::Fault);
+    change(&mut bench, 5_000, 300);
+    assert_eq!(save(&mut bench, 1), Ok(()));
+}
+
+/// A head that saves and resets in one breath, and a flash that takes its time.
+#[test]
+fn what_was_asked_for_is_stored_even_if_a_reset_follows_at_once() {
+    for command in [NmtCommand::ResetNode, NmtCommand::ResetCommunication] {
+        for ticks in [0, 30] {
+            let mut bench = Bench::ready();
+            bench.maintain();
+            change(&mut bench, 123_456, 500);
+            let request = [0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e'];
+            let save = Frame::standard(0x600 + u16::from(NODE), &request).unwrap();
+            let reset = Frame::standard(0, &[command as u8, 0]).unwrap();
+            let now = bench.now();
+            bench.vertebra.handle_frame(now, &save);
+            let early = (ticks > 0).then(|| bench.vertebra.poll_store().unwrap());
+            bench.vertebra.handle_frame(now, &reset);
+            for _ in 0..ticks {
+                bench.tick();
+            }
+            let record = early.unwrap_or_else(|| bench.vertebra.poll_store().unwrap());
+            bench.store.save(&record).unwrap();
+            let now = bench.now();
+            bench.vertebra.finish_store(now, Ok(()));
+            bench.nmt(NmtCommand::ResetNode);
+            bench.run(2);
+            assert_eq!(
+                held(&mut bench),
+                (123_456, 500),
+                "{command:?}, {ticks} ticks"
+            );
+            bench.power_cycle(prototype());
+            assert_eq!(
+                held(&mut bench),
+                (123_456, 500),
+                "{command:?}, {ticks} ticks"
+            );
+        }
+    }
 }
 
 #[test]

@@ -104,6 +104,38 @@ fn no_target_leads_faster_than_the_rate_limit() {
     }
 }
 
+/// A head may set RPDO1 to be event-driven (0x1400:2), and even store that.
+#[test]
+fn targets_wait_for_sync_whatever_the_type_of_their_rpdo() {
+    for transmission in [0, 240, 254, 255] {
+        let mut bench = Bench::ready();
+        bench.maintain();
+        bench.download(0x1400, 2, &[transmission]).unwrap();
+        bench.operate();
+        bench.run(200);
+        bench.mode = Mode::Off;
+        bench.stream = true;
+        bench.run(100);
+        bench.mode = Mode::Run;
+        bench.until(State::Run, 100);
+        let mut random = Random(0x5EED);
+        for _ in 0..300 {
+            bench.target = pose(random.pick(&[-500, 500]), random.pick(&[-250, 250]), 0);
+            for _ in 0..random.below(3) {
+                let another = bench.next_target();
+                bench.extra.push(another);
+            }
+            let (speed, change, _) = watch(&mut bench, 1 + random.below(15), 1);
+            assert!(speed <= RATE * 1.001, "type {transmission}: {speed} rad/s");
+            assert!(
+                change <= 3.0,
+                "type {transmission}: {change} rad/s in a tick"
+            );
+        }
+        assert_eq!(bench.state(), State::Run);
+    }
+}
+
 #[test]
 fn a_target_outside_is_limited_told_once_and_never_followed() {
     let mut bench = Bench::running();

@@ -2,6 +2,7 @@
 
 use eel_canopen::{
     Abort, Application, Config, Entry, Event, Frame, Identity, Mapped, NmtState, Node, PdoDefault,
+    STORED_PARAMETERS,
 };
 
 use crate::application::Objects;
@@ -164,6 +165,14 @@ impl Bench {
         let sent: Vec<_> = std::iter::from_fn(|| self.poll()).collect();
         assert!(sent.len() <= MOST_FRAMES, "{} frames waited", sent.len());
         sent
+    }
+
+    /// Ends what the node asked to be stored.
+    pub fn finish_store(&mut self, outcome: Result<(), Abort>) {
+        let mut bytes = [0; STORED_PARAMETERS];
+        let length = self.node.save_parameters(&mut bytes).expect("room");
+        let outcome = outcome.map(|()| &bytes[..length]);
+        self.node.finish_store(self.now_us, outcome);
     }
 
     /// Takes every event.

@@ -54,7 +54,7 @@ impl Watched {
             }
             3 => {
                 let outcome = input.pick(&[Ok(()), Err(Abort::Hardware)]);
-                self.bench.node.finish_store(self.bench.now_us, outcome);
+                self.bench.finish_store(outcome);
                 self.bench.sent();
             }
             4 => self.request([4, input.byte() & 3, 0, 0, 0, 0, 0, 0]),

@@ -58,7 +58,7 @@ fn step(bench: &mut Bench, input: &mut Input<'_>) {
         29 => bench.app.refuse = !bench.app.refuse,
         30 => {
             let outcome = input.pick(&[Ok(()), Err(Abort::Hardware)]);
-            bench.node.finish_store(bench.now_us, outcome);
+            bench.finish_store(outcome);
         }
         _ => drop(bench.events()),
     }

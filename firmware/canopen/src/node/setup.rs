@@ -4,14 +4,14 @@ use super::{Node, Waiting};
 use crate::deadline::after;
 use crate::lss::{self, Outcome};
 use crate::stored;
-use crate::{Abort, Application, Event, NmtCommand, NmtState, STORED_PARAMETERS, StoreRequest};
+use crate::{Abort, Application, Event, NmtCommand, NmtState, StoreRequest};
 
 /// How long a client waits for something to be stored.
 const STORE_TIMEOUT_US: u32 = 1_000_000;
 
 impl Node {
     /// Writes the parameters of the communication area to the start of `out` and returns how many
-    /// bytes they take, at most [`STORED_PARAMETERS`]; `None` when `out` is too short.
+    /// bytes they take, at most [`STORED_PARAMETERS`](crate::STORED_PARAMETERS); `None` when `out` is too short.
     #[inline(never)] // One copy in flash, and a small one.
     pub fn save_parameters(&self, out: &mut [u8]) -> Option<usize> {
         stored::save(&self.communication, &self.config, out)
@@ -27,14 +27,21 @@ impl Node {
         self.stored_refused
     }
 
-    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not.
+    /// Answers whoever asked for an [`Event::Store`]: it is done, or why it is not. What is done comes with
+    /// the parameters of the communication area as they were [saved](Self::save_parameters), which may have
+    /// changed since; where none were to be saved they are not looked at.
     #[inline(never)] // One copy in flash, and a small one.
-    pub fn finish_store(&mut self, now_us: u64, outcome: Result<(), Abort>) {
+    pub fn finish_store(&mut self, now_us: u64, outcome: Result<&[u8], Abort>) {
         self.expire_store(now_us);
         let request = self.storing.take();
-        if outcome.is_ok() {
+        if let Ok(saved) = outcome {
             match request {
-                Some(StoreRequest::Save(group)) if group.has_communication() => self.keep(),
+                Some(StoreRequest::Save(group)) if group.has_communication() => {
+                    self.stored.clear();
+                    if self.stored.extend_from_slice(saved).is_err() {
+                        self.stored.clear();
+                    }
+                }
                 Some(StoreRequest::Restore(group)) if group.has_communication() => {
                     self.stored.clear();
                 }
@@ -44,7 +51,7 @@ impl Node {
         }
         match self.waiting.take() {
             Some(Waiting::Sdo(answer)) => {
-                let answer = outcome.map_or_else(|abort| refusal(request, abort), |()| answer);
+                let answer = outcome.map_or_else(|abort| refusal(request, abort), |_| answer);
                 self.answer(answer);
             }
             Some(Waiting::Lss) => self.answer_lss(lss::stored(outcome.is_ok())),
@@ -61,20 +68,19 @@ impl Node {
         }
     }
 
+    /// Has no SDO client wait any more for something to be stored.
+    pub(super) fn leave_unanswered(&mut self) {
+        if let Some(Waiting::Sdo(_)) = self.waiting {
+            self.waiting = None;
+        }
+    }
+
     /// Tells an SDO client that storing takes too long.
     pub(super) fn expire_store(&mut self, now_us: u64) {
         if matches!(self.waiting, Some(Waiting::Sdo(_))) && now_us >= self.waiting_until_us {
             self.waiting = None;
             self.answer(refusal(self.storing, Abort::Hardware));
         }
-    }
-
-    /// Takes the parameters as they are for those after the next reset.
-    fn keep(&mut self) {
-        // As long as it can be, so that they fit, and then as long as they are.
-        let _ = self.stored.resize_default(STORED_PARAMETERS);
-        let length = stored::save(&self.communication, &self.config, &mut self.stored);
-        self.stored.truncate(length.unwrap_or(0));
     }
 
     /// Starts the node anew.

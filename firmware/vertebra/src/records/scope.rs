@@ -159,8 +159,6 @@ impl Scope {
         if is_fault && self.state == ScopeState::Waiting {
             self.state = ScopeState::Ending;
             self.since_fault = Some(0);
-            // The moment itself is not missed for a divider.
-            self.pause = 0;
         }
         if let Some(left) = self.pause.checked_sub(1) {
             self.pause = left;
@@ -221,6 +219,7 @@ impl Scope {
             first_us: self.newest.to_micros().saturating_sub(before),
             fault: self
                 .since_fault
+                .filter(|since| *since > 0)
                 .map(|since| self.samples.saturating_sub(since)),
             channels: self.channels,
         }

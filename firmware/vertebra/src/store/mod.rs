@@ -121,6 +121,8 @@ impl<F: NorFlash> Store<F> {
             }
             [Page::Holds(sequence, _), _] => (1, sequence),
             [_, Page::Holds(sequence, _)] => (0, sequence),
+            // That something is lost is not forgotten before there is something else.
+            [Page::Damaged, Page::Unfinished] => (1, 0),
             _ => (0, 0),
         };
         self.write(place, sequence.wrapping_add(1), record)

@@ -101,6 +101,11 @@ impl Model {
         }
     }
 
+    /// Turns a bit of the record in a page.
+    fn damage(&mut self, page: usize) {
+        self.cells[page * RAM_PAGE / WORD + 2].value ^= 1 << 20;
+    }
+
     fn power_up(&mut self) {
         self.is_off = false;
         self.left = None;
@@ -329,6 +334,39 @@ fn a_record_that_was_damaged_is_not_believed_and_not_taken_for_none() {
         store.save(&record(2)).unwrap();
         flip(&mut store, RAM_PAGE + at);
         assert_eq!(store.load(), Stored::Record(record(1)), "byte {at}");
+    }
+}
+
+/// Until another record is whole, the damage is not forgotten: a loss of power meanwhile must not have the
+/// vertebra swim with the settings of the factory.
+#[test]
+fn a_loss_of_power_while_a_damaged_record_is_replaced_does_not_hide_it() {
+    for pages in 1..=2 {
+        let damaged = |left| {
+            let mut store = used(pages, 7);
+            for page in 0..pages as usize {
+                store.flash_mut().damage(page);
+            }
+            store.flash_mut().left = left;
+            store
+        };
+        assert_eq!(damaged(None).load(), Stored::Damaged);
+        for cut in [Cut::Clean, Cut::Torn, Cut::Unreadable] {
+            for at in 0.. {
+                let mut store = damaged(Some((at, cut)));
+                let is_whole = store.save(&record(9)).is_ok();
+                store.flash_mut().power_up();
+                let left = store.load();
+                let is_new = left == Stored::Record(record(9));
+                assert!(
+                    is_new || !is_whole && left == Stored::Damaged,
+                    "{at} {cut:?} {left:?}"
+                );
+                if is_whole {
+                    break;
+                }
+            }
+        }
     }
 }
 

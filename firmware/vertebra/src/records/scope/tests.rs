@@ -109,6 +109,24 @@ fn a_fault_stands_in_the_middle_of_what_is_kept() {
     }
 }
 
+/// The head tells the time of the first sample and the time between two: they must hold for all.
+#[test]
+fn a_fault_does_not_change_the_time_between_two_samples() {
+    for end in [2_005, 2_006, 2_030] {
+        let mut scope = Scope::default();
+        scope.set(Field::ScopeChannel1, YAW).unwrap();
+        scope.set(Field::ScopeDivider, 10).unwrap();
+        scope.set(Field::ScopeTrigger, 2).unwrap();
+        run(&mut scope, 0..end, Some(2_004));
+        let (header, samples) = read(&mut scope);
+        assert_eq!(header.first_us, 0);
+        let times = (0..).step_by(10).map(|tick| vec![tick]);
+        assert!(samples.iter().cloned().eq(times.take(samples.len())));
+        let fault = header.fault.map(usize::from);
+        assert_eq!(fault, (end == 2_030).then_some(201));
+    }
+}
+
 #[test]
 fn an_early_fault_has_less_before_it() {
     let mut scope = Scope::default();
