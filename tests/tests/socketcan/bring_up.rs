@@ -184,3 +184,43 @@ fn the_head_leads_stops_in_order_and_is_alone() {
     head.wait().expect("it ends");
     assert!(last.contains("\"in-order\""), "{last}");
 }
+
+/// Whoever ends the head, the robot is not let go in the middle of a stroke.
+#[test]
+fn the_head_stops_in_order_when_the_system_ends_it_or_nobody_reads_it() {
+    let Some(name) = interface() else { return };
+    let _nodes = start(&name);
+    for signal in ["-TERM", "-HUP", ""] {
+        let mut head = Command::new(program())
+            .args(["head", &name, "--nodes", "3,5", "--json"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("a program");
+        let mut lines = BufReader::new(head.stdout.take().expect("a pipe")).lines();
+        let first = lines.next().expect("a vertebra is met").expect("text");
+        assert!(first.contains("time_s"), "{first}");
+        if signal.is_empty() {
+            // The next event finds the pipe closed.
+            drop(lines);
+        } else {
+            let process = head.id().to_string();
+            let sent = Command::new("kill").args([signal, &process]).status();
+            assert!(sent.is_ok_and(|status| status.success()));
+            let last = lines.map_while(Result::ok).last().expect("a summary");
+            assert!(last.contains("\"in-order\""), "{signal}: {last}");
+        }
+        let status = head.wait().expect("it ends");
+        assert!(status.code().is_some(), "{signal}: {status}");
+        // An end at once leaves them stopped.
+        let all = eel(&name, &["nodes", "--json"]).1;
+        assert_eq!(all.matches("\"pre-operational\"").count(), 2, "{all}");
+    }
+}
+
+#[test]
+fn a_command_that_nobody_was_heard_to_follow_is_no_success() {
+    let Some(name) = interface() else { return };
+    let (code, out, err) = eel(&name, &["nmt", "all", "stop"]);
+    assert_eq!((code, out.as_str()), (1, ""));
+    assert!(err.contains("nobody was heard on"), "{err}");
+}
