@@ -85,6 +85,21 @@ fn values_are_read_written_stored_and_restored_by_name_and_unit() {
     reset();
     assert_eq!(peak(), 3.0);
 
+    // What was written before one is refused is told.
+    let words = [
+        "write",
+        "3",
+        "gains.peak_torque=2",
+        "0x3000=hex:01",
+        "--json",
+    ];
+    let (code, out, err) = eel(&name, &words);
+    assert_eq!(code, 1);
+    assert!(err.contains("0x3000:0"), "{err}");
+    let told: Value = serde_json::from_str(&out).expect("JSON");
+    assert_eq!(told["written"].as_array().map(Vec::len), Some(1), "{out}");
+    assert_eq!(peak(), 2.0);
+
     let (code, out, err) = eel(&name, &["read", "3", "0x5000"]);
     assert_eq!((code, out.as_str()), (1, ""));
     assert!(err.contains("no such object (0x06020000)"), "{err}");
