@@ -1,6 +1,6 @@
 """Starts vertebra 3, lets it nod twice, and draws what it was told and what it did.
 
-    python nod.py [INTERFACE PICTURE]          vcan0 and nod.png where not given
+    python nod.py [INTERFACE [PICTURE]]        vcan0 and nod.png where not given
 """
 
 import math
@@ -70,9 +70,11 @@ def draw(rows, picture):
 
 
 if __name__ == "__main__":
-    interface, picture = sys.argv[1:] or ("vcan0", "nod.png")
+    interface, picture = (sys.argv[1:] + ["vcan0", "nod.png"][len(sys.argv) - 1 :])[:2]
     with canopen.Network().connect(interface="socketcan", channel=interface) as network:
         rows = nod(network)
     draw(rows, picture)
     highest = [max(column) for column in zip(*rows)]
+    if highest[2] < highest[1] / 2:
+        print("it did not follow: `eel read 3 pose` says why; `eel head --reset` ends a latched stop")
     print(f"told {highest[1]:.2f} degrees, reached {highest[2]:.2f}; drawn in {picture}")

@@ -68,16 +68,16 @@ pub fn run(live: &Live<'_>) -> anyhow::Result<bool> {
         dropped,
         ..
     } = counters;
-    println!(
+    crate::write(format_args!(
         "{} on {} for {:.1} s: {received} frames in, {sent} out, {skipped} ticks late, {dropped} \
-         frames not taken by the bus",
+         frames not taken by the bus\n",
         match live.count() {
             1 => "1 vertebra".to_owned(),
             count => format!("{count} vertebrae"),
         },
         live.interface,
         start.elapsed().as_secs_f64(),
-    );
+    ))?;
     Ok(dropped == 0)
 }
 

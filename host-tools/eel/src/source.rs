@@ -11,7 +11,7 @@ const TOLD: u64 = 10;
 /// Longest wait before the caller may flush and look at the time.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// How often Ctrl-C came.
+/// How often Ctrl-C came, or another wish that the program end.
 static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 /// How often Ctrl-C is left to the program before it ends it, whatever it does.
 const PATIENT: u32 = 3;
@@ -55,20 +55,51 @@ pub trait Sink {
     fn idle(&mut self) -> std::io::Result<()>;
 }
 
-/// Makes Ctrl-C end the pass in good order; one that is pressed again and again ends the program.
+/// Makes Ctrl-C, a system that ends the program (SIGTERM) and a terminal that goes away (SIGHUP, but not
+/// under nohup) end the pass in good order; Ctrl-C that is pressed again and again ends the program.
 ///
 /// # Errors
 /// When the system refuses.
 pub fn catch_interrupt() -> Result<()> {
-    ctrlc::set_handler(|| {
-        if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= PATIENT {
-            std::process::exit(INTERRUPT_CODE);
-        }
-    })
-    .context("can't listen for Ctrl-C")
+    ctrlc::set_handler(interrupt).context("can't listen for Ctrl-C")?;
+    #[cfg(unix)]
+    catch_end().context("can't listen for SIGTERM")?;
+    Ok(())
 }
 
-/// Returns how often Ctrl-C came since [`catch_interrupt`].
+fn interrupt() {
+    if INTERRUPTS.fetch_add(1, Ordering::Relaxed) >= PATIENT {
+        std::process::exit(INTERRUPT_CODE);
+    }
+}
+
+#[cfg(unix)]
+fn catch_end() -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGTERM};
+
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mut signals = vec![SIGTERM];
+    if !ignores(&status, SIGHUP) {
+        signals.push(SIGHUP);
+    }
+    let mut signals = signal_hook::iterator::Signals::new(signals)?;
+    std::thread::spawn(move || {
+        for _ in signals.forever() {
+            interrupt();
+        }
+    });
+    Ok(())
+}
+
+/// Tells by `/proc/self/status` whether whoever started the program, such as nohup, has a signal ignored.
+#[cfg(unix)]
+fn ignores(status: &str, signal: i32) -> bool {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}
+
+/// Returns how often the program was asked to end since [`catch_interrupt`].
 pub fn interrupts() -> u32 {
     INTERRUPTS.load(Ordering::Relaxed)
 }
@@ -129,4 +160,16 @@ pub fn run(bus: &mut dyn Bus, limits: Limits, sink: &mut dyn Sink) -> Result<See
         );
     }
     Ok(seen)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signal_that_nohup_ignores_is_left_alone() {
+        let status = "Name:\teel\nSigBlk:\t0000000000000000\nSigIgn:\t0000000000001001\n";
+        assert!(ignores(status, 1));
+        assert!(!ignores(status, 15) && !ignores("", 1));
+    }
 }

@@ -167,10 +167,22 @@ impl Guest {
         Ok(script)
     }
 
+    /// Returns the command that boots; the guest ends with this program, also where that is killed.
+    fn command(&self) -> Command {
+        match process::find("setpriv") {
+            Some(setpriv) => {
+                let mut kernel = Command::new(setpriv);
+                kernel.args(["--pdeathsig", "TERM"]).arg(&self.kernel);
+                kernel
+            }
+            None => Command::new(&self.kernel),
+        }
+    }
+
     /// Boots, shows what the command writes, and returns its exit status.
     fn run(&self) -> Result<u8> {
         let log = File::create(self.file("kernel.log"))?;
-        let mut kernel = Command::new(&self.kernel);
+        let mut kernel = self.command();
         if let Some(library) = &self.preload {
             kernel.env("LD_PRELOAD", library);
         }

@@ -85,6 +85,21 @@ fn values_are_read_written_stored_and_restored_by_name_and_unit() {
     reset();
     assert_eq!(peak(), 3.0);
 
+    // What was written before one is refused is told.
+    let words = [
+        "write",
+        "3",
+        "gains.peak_torque=2",
+        "0x3000=hex:01",
+        "--json",
+    ];
+    let (code, out, err) = eel(&name, &words);
+    assert_eq!(code, 1);
+    assert!(err.contains("0x3000:0"), "{err}");
+    let told: Value = serde_json::from_str(&out).expect("JSON");
+    assert_eq!(told["written"].as_array().map(Vec::len), Some(1), "{out}");
+    assert_eq!(peak(), 2.0);
+
     let (code, out, err) = eel(&name, &["read", "3", "0x5000"]);
     assert_eq!((code, out.as_str()), (1, ""));
     assert!(err.contains("no such object (0x06020000)"), "{err}");
@@ -183,4 +198,44 @@ fn the_head_leads_stops_in_order_and_is_alone() {
     let last = lines.map_while(Result::ok).last().expect("a summary");
     head.wait().expect("it ends");
     assert!(last.contains("\"in-order\""), "{last}");
+}
+
+/// Whoever ends the head, the robot is not let go in the middle of a stroke.
+#[test]
+fn the_head_stops_in_order_when_the_system_ends_it_or_nobody_reads_it() {
+    let Some(name) = interface() else { return };
+    let _nodes = start(&name);
+    for signal in ["-TERM", ""] {
+        let mut head = Command::new(program())
+            .args(["head", &name, "--nodes", "3,5", "--seconds", "20", "--json"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("a program");
+        let mut lines = BufReader::new(head.stdout.take().expect("a pipe")).lines();
+        let first = lines.next().expect("a vertebra is met").expect("text");
+        assert!(first.contains("time_s"), "{first}");
+        if signal.is_empty() {
+            // The next event finds the pipe closed.
+            drop(lines);
+        } else {
+            let process = head.id().to_string();
+            let sent = Command::new("kill").args([signal, &process]).status();
+            assert!(sent.is_ok_and(|status| status.success()));
+            let last = lines.map_while(Result::ok).last().expect("a summary");
+            assert!(last.contains("\"in-order\""), "{signal}: {last}");
+        }
+        let status = head.wait().expect("it ends");
+        assert!(status.code().is_some(), "{signal}: {status}");
+        // An end at once leaves them stopped.
+        let all = eel(&name, &["nodes", "--json"]).1;
+        assert_eq!(all.matches("\"pre-operational\"").count(), 2, "{all}");
+    }
+}
+
+#[test]
+fn a_command_that_nobody_was_heard_to_follow_is_no_success() {
+    let Some(name) = interface() else { return };
+    let (code, out, err) = eel(&name, &["nmt", "all", "stop"]);
+    assert_eq!((code, out.as_str()), (1, ""));
+    assert!(err.contains("nobody was heard on"), "{err}");
 }

@@ -20,9 +20,10 @@ const OTHER: Duration = Duration::from_millis(350);
 
 const AFTER: &str = "\
 Starts the vertebrae on the bus, leads each from where it is into the gait, and stops them in order:
-after --seconds, or at Ctrl-C, the gait fades out, the eel straightens, drives are switched off and the
-nodes leave operation. A second Ctrl-C ends it at once: NMT stop to all, and vertebrae that move let go.
-Where the head itself dies, vertebrae let go within 0.1 s. Vertebrae may be boards, simulated, or both.
+after --seconds, at Ctrl-C or SIGTERM, or when its terminal or the reader of its output goes away, the gait
+fades out, the eel straightens, drives are switched off and the nodes leave operation. A second Ctrl-C ends
+it at once: NMT stop to all, and vertebrae that move let go. Where the head itself dies, vertebrae let go
+within 0.1 s. Vertebrae may be boards, simulated, or both.
 
 Needs --yes except on a virtual interface. Only one head may be on a bus.
 

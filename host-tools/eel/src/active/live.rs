@@ -41,6 +41,8 @@ pub struct Live {
     outcome: Outcome,
     last_sync: Option<Instant>,
     sync_period: Duration,
+    /// Why nothing more can be told.
+    mute: Option<std::io::Error>,
     /// Whether stops that were latched before the head came are acknowledged.
     pub resets_first: bool,
     has_reset: u16,
@@ -99,16 +101,17 @@ impl Live {
             outcome: Outcome::default(),
             last_sync: None,
             sync_period: Duration::from_micros(u64::from(config.sync_period.to_micros())),
+            mute: None,
             resets_first: false,
             has_reset: 0,
         }
     }
 
-    /// Leads until `limit` or Ctrl-C and stops in order; a second Ctrl-C ends it at once. Ctrl-C must be
-    /// [caught](source::catch_interrupt) already.
+    /// Leads until `limit` or Ctrl-C and stops in order, also where nobody reads what it tells any more; a
+    /// second Ctrl-C ends it at once. Ctrl-C must be [caught](source::catch_interrupt) already.
     ///
     /// # Errors
-    /// What the bus fails with.
+    /// What the bus fails with, and after a stop in order what the output failed with.
     pub fn run(&mut self, limit: Option<Duration>) -> Result<Outcome> {
         self.start = Instant::now();
         let result = self.lead(limit);
@@ -118,6 +121,9 @@ impl Live {
             let _ = self.stop_all();
         }
         result?;
+        if let Some(error) = self.mute.take() {
+            return Err(error.into());
+        }
         self.outcome.elapsed = self.start.elapsed();
         Ok(self.outcome)
     }
@@ -128,8 +134,9 @@ impl Live {
             self.receive()?;
             let elapsed = self.start.elapsed();
             let now = eel_units::Instant::from_micros(elapsed.as_micros() as u64);
+            let is_over = self.mute.is_some() || limit.is_some_and(|limit| elapsed >= limit);
             match source::interrupts() {
-                0 if limit.is_none_or(|limit| elapsed < limit) => {}
+                0 if !is_over => {}
                 0 | 1 => self.head.stop(now),
                 _ => {
                     self.outcome.at_once = true;
@@ -141,7 +148,7 @@ impl Live {
                 self.waiting.push_back(frame);
             }
             self.send()?;
-            self.events(elapsed)?;
+            self.events(elapsed);
             self.outcome.most_running = self.outcome.most_running.max(self.head.running());
             if self.head.phase() == Phase::Stopped && self.waiting.is_empty() {
                 return Ok(());
@@ -235,13 +242,13 @@ impl Live {
     }
 
     /// Tells what happened; what happened to several vertebrae at once is one line.
-    fn events(&mut self, elapsed: Duration) -> Result<()> {
+    fn events(&mut self, elapsed: Duration) {
         let mut lines: Vec<(String, Vec<u8>)> = Vec::new();
         while let Some(event) = self.head.poll_event() {
             let acknowledged = self.acknowledge(&event, elapsed);
             self.outcome.troubles += u64::from(is_trouble(&event) && !acknowledged);
             if self.is_json {
-                writeln!(stdout(), "{}", json_of(&event, elapsed))?;
+                self.tell(format_args!("{}", json_of(&event, elapsed)));
                 continue;
             }
             let (node, text) = words(&event, acknowledged);
@@ -250,16 +257,20 @@ impl Live {
                 None => lines.push((text, node.into_iter().collect())),
             }
         }
-        if lines.is_empty() {
-            return Ok(());
+        if !lines.is_empty() {
+            self.status.clear();
         }
-        self.status.clear();
-        let mut out = stdout().lock();
         for (text, nodes) in lines {
-            let who = Who(&nodes).to_string();
-            writeln!(out, "{:9.3}  {who:<16}  {text}", elapsed.as_secs_f64())?;
+            let (who, time) = (Who(&nodes).to_string(), elapsed.as_secs_f64());
+            self.tell(format_args!("{time:9.3}  {who:<16}  {text}"));
         }
-        Ok(out.flush()?)
+    }
+
+    /// Writes a line. An output that fails must not let go of a robot that moves: it only ends the run.
+    fn tell(&mut self, line: std::fmt::Arguments<'_>) {
+        if self.mute.is_none() {
+            self.mute = writeln!(stdout(), "{line}").err();
+        }
     }
 }
 
@@ -272,7 +283,11 @@ impl Status {
     fn show(&mut self, elapsed: Duration, head: &Head, outcome: &Outcome) {
         if !self.has_told_alone && elapsed > ALONE && outcome.received == 0 {
             self.has_told_alone = true;
-            eprintln!("eel: nobody is on the bus yet; the head goes on and starts whoever comes");
+            // What can't be shown is no reason to end.
+            let _ = writeln!(
+                stderr(),
+                "eel: nobody is on the bus yet; the head goes on and starts whoever comes"
+            );
         }
         if !self.is_on || elapsed < self.due {
             return;
@@ -289,7 +304,6 @@ impl Status {
             .filter_map(|id| head.node(id))
             .filter(|node| node.stage != eel_head::Stage::Missing)
             .count();
-        // What can't be shown is no reason to end.
         let _ = write!(
             stderr(),
             "\r{:7.1} s  {phase}, {} of {there} vertebrae run, {} SYNCs, late by {:.1} ms at most, \

@@ -175,7 +175,8 @@ impl Lss {
         for id in &assign.ids {
             let Some(address) = assign.select(client)? else {
                 let rest = assign.ids.len() - rows.len();
-                eprintln!("eel: no more nodes without an id; {rest} ids are left over");
+                let ids = if rest == 1 { "id is" } else { "ids are" };
+                eprintln!("eel: no more nodes without an id; {rest} {ids} left over");
                 return Ok((rows, silent + 1));
             };
             let mut lss = client.lss();

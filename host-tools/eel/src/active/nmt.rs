@@ -28,7 +28,7 @@ leaves operation while it moves lets go and latches.
 --json: one object: command (string), nodes (array of objects: node (number), state (string), confirmed
 (bool)).
 
-Exit codes: 0 fine; 1 a node did not report the state; 2 wrong usage; 3 the bus failed.
+Exit codes: 0 fine; 1 a node did not report the state, or nobody was heard; 2 wrong usage; 3 the bus failed.
 
 Examples:
   eel nmt 3 pre-operational
@@ -117,10 +117,16 @@ impl Nmt {
             Some(node) => one(&mut client, node, command)?,
             None => everybody(&mut client)?,
         };
+        if states.is_empty() {
+            eprintln!(
+                "eel: nobody was heard on {bus}: nodes are off, at another bit rate, have no id yet (`eel lss \
+                 scan`), or send no heartbeat; the command was sent"
+            );
+        }
         let is_confirmed = |state: NmtState| {
             state == command.target() || command.is_reset() && state == NmtState::Initialising
         };
-        let mut refusals = 0;
+        let mut refusals = u64::from(states.is_empty());
         let mut rows = Vec::new();
         for (node, state) in states {
             let confirmed = is_confirmed(state);

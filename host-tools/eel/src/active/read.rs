@@ -27,7 +27,8 @@ numbers: 0x1017, 0x1018:4; or all. Numbers come in their units, codes with their
 apply value (number in the unit, or string), raw (number), unit, words (string: a code's meaning),
 bytes (string of hexadecimal digits), file (string), error (string), code (number: SDO abort code)).
 
-Exit codes: 0 fine; 1 the node refuses or does not answer; 2 wrong usage; 3 the bus failed.
+Exit codes: 0 fine; 1 the node refuses or does not answer; 2 wrong usage; 3 the bus or
+a file failed.
 
 Examples:
   eel read 3 pose.yaw

@@ -4,11 +4,11 @@ use std::io::{Write as _, stdout};
 
 use anyhow::Result;
 use clap::Args;
-use eel_client::Method;
+use eel_client::{Client, Method};
 use serde_json::json;
 
 use super::Node;
-use super::bus::{BusOption, Consent};
+use super::bus::{AnyBus, BusOption, Consent};
 use super::read::Bar;
 use crate::object::{self, Object};
 use crate::usage::Usage;
@@ -23,7 +23,8 @@ order given, until one is refused. What is written lasts until the node is reset
 --yes is needed, except on a virtual interface, for what can move a robot: target, moment, RPDOs, and
 objects that nobody knows.
 
---json: one object: node (number), written (array of objects as those of `eel read --json`).
+--json: one object: node (number), written (array of objects as those of `eel read --json`;
+where one is refused, those before it).
 
 Exit codes: 0 fine; 1 the node refuses or does not answer; 2 wrong usage; 3 the bus failed.
 
@@ -66,11 +67,26 @@ impl Write {
             self.consent
                 .check(&bus, &format!("writing {}", object.name))?;
         }
-        let mut client = eel_client::Client::new(super::bus::open(&bus)?);
+        let mut client = Client::new(super::bus::open(&bus)?);
+        let mut rows = Vec::new();
+        let result = self.all(&mut client, &pairs, &mut rows);
+        if self.json {
+            let all = json!({"node": self.node.0, "written": rows});
+            writeln!(stdout(), "{all}")?;
+        }
+        result.map(|()| 0)
+    }
+
+    /// Writes one after the other until one is refused; `rows` gets those that were written.
+    fn all(
+        &self,
+        client: &mut Client<AnyBus>,
+        pairs: &[(Object, Vec<u8>)],
+        rows: &mut Vec<serde_json::Value>,
+    ) -> Result<()> {
         let width = pairs.iter().map(|(object, _)| object.name.len()).max();
         let width = width.unwrap_or_default();
-        let mut rows = Vec::new();
-        for (object, bytes) in &pairs {
+        for (object, bytes) in pairs {
             let mut bar = Bar::new(&object.name);
             let written = client.download(
                 self.node.0,
@@ -93,11 +109,7 @@ impl Write {
                 writeln!(stdout(), "{name:width$}  {text}  written")?;
             }
         }
-        if self.json {
-            let all = json!({"node": self.node.0, "written": rows});
-            writeln!(stdout(), "{all}")?;
-        }
-        Ok(0)
+        Ok(())
     }
 }
 
