@@ -76,11 +76,6 @@ pub async fn run(hardware: Hardware, birth: Birth) {
     let mut heard = Identifiers::new();
     loop {
         ticker.next().await;
-        let identifiers = vertebra.identifiers();
-        if identifiers != heard {
-            bus::hear(&hardware.filters, &identifiers);
-            heard = identifiers;
-        }
         let start = Instant::now();
         let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
@@ -93,6 +88,12 @@ pub async fn run(hardware: Hardware, birth: Birth) {
             bus::send,
         );
         bridges.apply(drives);
+        // Before anybody can answer what the turn sends: a boot-up under a new node id, say.
+        let identifiers = vertebra.identifiers();
+        if identifiers != heard {
+            bus::hear(&hardware.filters, &identifiers);
+            heard = identifiers;
+        }
         report(&mut vertebra);
         store(&mut vertebra);
         let (received, transmitted) = bus::overruns();

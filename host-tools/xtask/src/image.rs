@@ -9,9 +9,8 @@ use object::elf::{FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 
-/// Flash of both boards: 512 KB here but for the 4 KB that keep settings, where the STM32F405 in QEMU has
-/// 1 MB.
-pub const FLASH: Range<u64> = 0x0800_0000..0x0807_F000;
+/// Flash for programs of both boards: bank 1 here, half of 512 KB, where the STM32F405 in QEMU has 1 MB.
+pub const FLASH: Range<u64> = 0x0800_0000..0x0804_0000;
 /// Static RAM of both boards that is one piece: 96 KB here.
 pub const RAM: Range<u64> = 0x2000_0000..0x2001_8000;
 
