@@ -95,7 +95,7 @@ const fn damping(default: i64) -> Shape {
 const fn half_range(default: i64) -> Shape {
     Shape {
         default,
-        min: 0,
+        min: 1,
         max: default,
         ..angle(RW, NO)
     }
@@ -108,6 +108,7 @@ const STIFFNESS_SCALE: Shape = Shape {
 };
 const PEAK_TORQUE: Shape = Shape {
     default: 3_000,
+    min: 1,
     max: 32_000,
     ..thousandths(DataType::U16, RW, NO, "N.m")
 };

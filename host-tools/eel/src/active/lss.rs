@@ -34,7 +34,7 @@ Examples:
   eel lss scan
   eel lss assign 3 5 --store                   the first found becomes 3, the next 5
   eel lss assign 3 --serial 0x1A2B3C4D --store
-  eel lss assign 7 --from 3 --store && eel nmt 3 reset-communication
+  eel lss assign 7 --from 3 --store            3 becomes 7 with its next power-up or reset
   eel lss inquire 3";
 
 /// Find nodes without an id and give them one
