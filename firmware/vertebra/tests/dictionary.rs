@@ -243,17 +243,26 @@ fn a_setting_takes_effect_and_reset_node_takes_it_back() {
     assert_eq!(number(&mut bench, Field::RangeYaw), 5_236);
 }
 
+/// What can be written can be stored and started with: nothing that is taken is refused later.
 #[test]
-fn a_setting_that_makes_no_sense_is_a_fault_until_it_is_mended() {
+fn a_setting_that_makes_no_sense_is_refused_and_nothing_changes() {
+    const TOO_LOW: u32 = 0x0609_0032;
     let mut bench = Bench::ready();
     bench.maintain();
-    set(&mut bench, Field::PeakTorque, 0).unwrap();
-    bench.run(10);
-    assert_eq!(bench.state(), State::Fault);
-    assert!(bench.holds(Condition::Settings));
-    set(&mut bench, Field::PeakTorque, 3_000).unwrap();
-    bench.operate();
-    bench.recover();
+    for field in [
+        Field::PeakTorque,
+        Field::RangeYaw,
+        Field::RangePitch,
+        Field::RangeRoll,
+        Field::RateLimit,
+    ] {
+        let before = number(&mut bench, field);
+        assert_eq!(set(&mut bench, field, 0), Err(TOO_LOW), "{field:?}");
+        assert_eq!(number(&mut bench, field), before);
+        set(&mut bench, field, 1).unwrap();
+        bench.run(10);
+        assert!(!bench.holds(Condition::Settings), "{field:?}");
+    }
 }
 
 #[test]
