@@ -344,7 +344,7 @@ fn a_loss_of_power_while_a_damaged_record_is_replaced_does_not_hide_it() {
     for pages in 1..=2 {
         let damaged = |left| {
             let mut store = used(pages, 7);
-            for page in 0..pages as usize {
+            for page in 0..pages {
                 store.flash_mut().damage(page);
             }
             store.flash_mut().left = left;
