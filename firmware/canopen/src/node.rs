@@ -171,7 +171,7 @@ impl Node {
     /// Takes the next frame to send.
     ///
     /// At most 16 wait. One that finds the queue full is dropped and counted
-    /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced. Eight
+    /// ([`Counters::transmit_dropped`]); a PDO or heartbeat that waits already is replaced. Four
     /// more of the SDO server wait until there is no other.
     #[inline(never)] // One copy in flash, and a small one.
     pub fn poll_transmit(&mut self) -> Option<Frame> {
