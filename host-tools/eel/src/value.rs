@@ -351,11 +351,11 @@ mod tests {
         );
         assert_eq!(
             bytes("gains.peak_torque", "40", false).unwrap_err(),
-            "gains.peak_torque takes 0.000 N.m to 32.000 N.m; 40 is outside"
+            "gains.peak_torque takes 0.001 N.m to 32.000 N.m; 40 is outside"
         );
         assert_eq!(
             bytes("gains.peak_torque", "40000", true).unwrap_err(),
-            "gains.peak_torque takes 0 to 32000; 40000 is outside"
+            "gains.peak_torque takes 1 to 32000; 40000 is outside"
         );
         assert_eq!(
             bytes("gains.peak_torque", "much", false).unwrap_err(),

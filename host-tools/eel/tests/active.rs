@@ -35,7 +35,7 @@ fn wrong_names_and_values_are_told_before_a_bus_is_opened() {
     refused(
         &["write", "3", "gains.peak_torque=40"],
         2,
-        "takes 0.000 N.m to 32.000 N.m; 40 is outside",
+        "takes 0.001 N.m to 32.000 N.m; 40 is outside",
     );
     refused(
         &["write", "3", "pose.yaw=0.1"],
