@@ -38,8 +38,9 @@ def states(bus, node):
     told["after strange commands"] = bus.wait(0x703, count=2)[-1][0]
     told["boot-ups of 3"] = bus.since(start, 0x703).count(bytes([BOOT_UP]))
     told["states of 5"] = sorted({data[0] for data in bus.since(start, 0x705)})
+    mark = bus.mark()
     bus.network.nmt.state = "RESET"
-    bus.wait(0x705, content=bytes([BOOT_UP]))
+    bus.wait(0x705, mark=mark, content=bytes([BOOT_UP]))
     return told
 
 

@@ -169,5 +169,6 @@ with peer.bus() as bus:
             "beats": beats(bus),
         }
     )
+    mark = bus.mark()
     vertebra.nmt.state = "RESET"
-    bus.wait(0x703, content=b"\0")
+    bus.wait(0x703, mark=mark, content=b"\0")
