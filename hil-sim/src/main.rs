@@ -95,6 +95,14 @@ struct SwimArgs {
     /// Folder for bus.log (candump), states.csv, stride.svg and summary.json
     #[arg(long, default_value = "out/swim", value_name = "DIR")]
     out: PathBuf,
+    /// Run these vertebrae, or all without IDS, as the Cortex-M4 image in QEMU, one process each, in
+    /// lock-step; the frame log is the same. Takes qemu-system-arm and `cargo xtask firmware qemu`
+    #[arg(long, value_name = "IDS", value_parser = node_ids, num_args = 0..=1,
+        default_missing_value = "1-10")]
+    qemu: Option<NodeList>,
+    /// With --qemu: the image [default: target/firmware/board-qemu.elf]
+    #[arg(long, value_name = "FILE", requires = "qemu")]
+    image: Option<PathBuf>,
     /// Print one JSON object instead of the table, and no progress bar
     #[arg(long)]
     json: bool,
@@ -185,6 +193,10 @@ fn run_swim(args: &SwimArgs) -> anyhow::Result<bool> {
         seed: args.seed,
         out: Some(args.out.clone()),
         faults: Vec::new(),
+        emulated: args.qemu.clone().map(|NodeList(nodes)| swim::Emulated {
+            nodes,
+            image: args.image.clone().unwrap_or_else(default_image),
+        }),
         progress: !args.json,
     };
     interrupt::listen()?;
@@ -199,6 +211,15 @@ fn run_swim(args: &SwimArgs) -> anyhow::Result<bool> {
         eprintln!("hil-sim: {complaint}");
     }
     Ok(complaints.is_empty())
+}
+
+/// Returns where `cargo xtask firmware qemu` puts the image, beside the folder of this program.
+fn default_image() -> PathBuf {
+    let program = std::env::current_exe().unwrap_or_default();
+    let target = program.parent().and_then(std::path::Path::parent);
+    target
+        .unwrap_or(std::path::Path::new("target"))
+        .join("firmware/board-qemu.elf")
 }
 
 /// Runs vertebrae on an interface and tells whether the bus took all that they sent.

@@ -1,8 +1,9 @@
 //! A run that did not go as it should says why.
 
 use eel_head::Gait;
+use eel_protocol::NodeId;
 use hil_sim::robot::{Fault, FaultKind};
-use hil_sim::swim::{Options, run, run_while};
+use hil_sim::swim::{Emulated, Options, run, run_while};
 
 fn options(faults: Vec<Fault>) -> Options {
     Options {
@@ -14,6 +15,7 @@ fn options(faults: Vec<Fault>) -> Options {
         seed: 1,
         out: None,
         faults,
+        emulated: None,
         progress: false,
     }
 }
@@ -23,6 +25,21 @@ fn a_run_as_planned_has_nothing_to_complain_about() {
     let summary = run(&options(Vec::new())).expect("nothing is written");
     assert_eq!(summary.complaints(), [""; 0]);
     assert!(!summary.interrupted);
+}
+
+#[test]
+fn an_image_that_is_missing_is_named_with_the_cure() {
+    let emulated = Emulated {
+        nodes: vec![NodeId::FIRST],
+        image: "no/such/image.elf".into(),
+    };
+    let options = Options {
+        emulated: Some(emulated),
+        ..options(Vec::new())
+    };
+    let text = format!("{:#}", run(&options).expect_err("no image"));
+    assert!(text.contains("no/such/image.elf"), "{text}");
+    assert!(text.contains("cargo xtask firmware qemu"), "{text}");
 }
 
 #[test]

@@ -5,6 +5,9 @@
 //! mean nothing, failing sensors, a head that falls silent, a second power-up. The same packets go
 //! to the image and to the crate here, and every answer must be the same.
 
+#[path = "qemu/swim.rs"]
+mod swim;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

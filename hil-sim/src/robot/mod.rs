@@ -9,6 +9,7 @@ mod clock;
 mod fault;
 mod link;
 mod node;
+mod qemu;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use clock::{PLANT_STEP_NS, TICK_NS};
 pub use fault::{Fault, FaultKind};
 pub use link::{Link, SENDING};
 pub use node::{NativeNode, Node, Turn};
+pub use qemu::QemuNode;
 
 use clock::{Happening, Schedule};
 
@@ -99,16 +101,16 @@ impl Robot {
     /// # Errors
     /// A bit rate that the bus can't have.
     pub fn new(config: &Config) -> anyhow::Result<Self> {
-        Self::with_nodes(config, |id| Box::new(NativeNode::new(id)))
+        Self::with_nodes(config, |id| Ok(Box::new(NativeNode::new(id))))
     }
 
     /// Puts a robot together of the nodes that `make` returns.
     ///
     /// # Errors
-    /// A bit rate that the bus can't have.
+    /// A bit rate that the bus can't have, or a node that can't be made.
     pub fn with_nodes(
         config: &Config,
-        mut make: impl FnMut(NodeId) -> Box<dyn Node>,
+        mut make: impl FnMut(NodeId) -> anyhow::Result<Box<dyn Node>>,
     ) -> anyhow::Result<Self> {
         let rate = BitRate::new(config.bitrate)
             .ok_or_else(|| anyhow::anyhow!("no bus runs at {} bit/s", config.bitrate))?;
@@ -119,7 +121,7 @@ impl Robot {
             let link = Link::attach(&mut bus, vertebra_controller(id))?;
             nodes.push(Seat {
                 id,
-                node: make(id),
+                node: make(id)?,
                 link,
                 drives: [Drive::Off; 3],
             });
@@ -178,6 +180,13 @@ impl Robot {
     /// Returns a vertebra.
     pub fn node(&self, id: NodeId) -> &dyn Node {
         self.nodes[id.index()].node.as_ref()
+    }
+
+    /// Returns why a vertebra could not go on, once.
+    pub fn take_failure(&mut self) -> Option<anyhow::Error> {
+        self.nodes
+            .iter_mut()
+            .find_map(|seat| seat.node.take_failure())
     }
 
     /// Returns the drives of a vertebra since its last turn.

@@ -43,6 +43,11 @@ pub trait Node {
     /// Returns the next thing that happened, where the node tells.
     fn poll_event(&mut self) -> Option<Event>;
 
+    /// Returns why the node could not go on, once; it has been silent and free since.
+    fn take_failure(&mut self) -> Option<anyhow::Error> {
+        None
+    }
+
     /// Returns the state, where the node tells.
     fn state(&self) -> Option<State> {
         self.vertebra().map(Vertebra::state)

@@ -74,12 +74,12 @@ fn losses(garbled: u32, missed: u32) -> u64 {
     let mut robot = Robot::with_nodes(&config, |id| {
         let deaf = id.get() == 5;
         let (missed, garbled) = if deaf { (missed, garbled) } else { (0, 0) };
-        Box::new(Deaf {
+        Ok(Box::new(Deaf {
             node: NativeNode::new(id),
             id,
             missed,
             garbled,
-        })
+        }))
     })
     .expect("the usual bit rate");
     robot.run(3_000_000_000, &mut Blind);

@@ -12,14 +12,14 @@ use anyhow::Context;
 use eel_head::{Config as HeadConfig, Event as HeadEvent, Gait, Phase};
 use eel_protocol::{NodeId, emergency};
 use eel_units::Instant;
-use eel_vertebra::{Drive, Vertebra};
+use eel_vertebra::Drive;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::bus::Event as BusEvent;
 use crate::picture;
 use crate::plant::Plant;
 use crate::plant::measures::{Moment, Recording, Stroke, swim_figures};
-use crate::robot::{Config, Fault, NODES, Node, Observer, Robot, Turn};
+use crate::robot::{Config, Fault, NODES, NativeNode, Node, Observer, QemuNode, Robot, Turn};
 
 pub use record::Records;
 pub use summary::{NodeSummary, Summary};
@@ -55,14 +55,25 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
+    /// Vertebrae that run in QEMU instead of in this process.
+    pub emulated: Option<Emulated>,
     /// Whether a progress bar is drawn on standard error.
     pub progress: bool,
+}
+
+/// Which vertebrae run in QEMU, each as a process of its own.
+#[derive(Clone, Debug)]
+pub struct Emulated {
+    /// Their node ids.
+    pub nodes: Vec<NodeId>,
+    /// The image that they run, `target/firmware/board-qemu.elf`.
+    pub image: PathBuf,
 }
 
 /// Swims and returns what came of it.
 ///
 /// # Errors
-/// Records that can't be written; the text names the file.
+/// Records that can't be written, the text names the file; vertebrae in QEMU that can't start or fail.
 pub fn run(options: &Options) -> anyhow::Result<Summary> {
     run_while(options, || true)
 }
@@ -81,7 +92,7 @@ pub fn run_while(
         faults: options.faults.clone(),
         ..Config::new(HeadConfig::new(options.gait), options.seed)
     };
-    let mut robot = Robot::new(&config)?;
+    let mut robot = Robot::with_nodes(&config, |id| make_node(options, id))?;
     let mut watcher = Watcher::new(options)?;
     let end_ns = (options.seconds * 1e9) as u64;
     let bar = progress_bar(options);
@@ -102,6 +113,15 @@ pub fn run_while(
     Ok(summary)
 }
 
+/// Makes a vertebra where the options want it.
+fn make_node(options: &Options, id: NodeId) -> anyhow::Result<Box<dyn Node>> {
+    let emulated = options.emulated.as_ref();
+    Ok(match emulated.filter(|it| it.nodes.contains(&id)) {
+        Some(Emulated { image, .. }) => Box::new(QemuNode::new(id, image)?),
+        None => Box::new(NativeNode::new(id)),
+    })
+}
+
 /// Runs up to `to_ns`, at most a row of the state record.
 fn advance(
     robot: &mut Robot,
@@ -111,6 +131,9 @@ fn advance(
     started: WallClock,
 ) -> anyhow::Result<()> {
     robot.run(to_ns, watcher);
+    if let Some(failure) = robot.take_failure() {
+        return Err(failure);
+    }
     watcher.row(robot)?;
     if robot.now_ns().is_multiple_of(SHOWN_NS) {
         let simulated = robot.now_ns() as f64 / 1e9;
@@ -298,9 +321,15 @@ impl Observer for Watcher {
     fn turn(&mut self, id: NodeId, node: &dyn Node, _turn: &Turn<'_>, plant: &Plant) {
         let index = id.index();
         self.tracking.note_torque(index, plant.motor_torque(index));
-        if let Some(reference) = node.vertebra().and_then(Vertebra::reference) {
-            self.tracking
-                .note_pose(index, &reference, plant.joint_pose(index));
+        let truth = plant.joint_pose(index);
+        match node.vertebra() {
+            Some(vertebra) => {
+                if let Some(reference) = vertebra.reference() {
+                    self.tracking.note_pose(index, &reference, truth);
+                }
+            }
+            // Its reference is inside the emulator.
+            None => self.tracking.note_yaw(index, truth),
         }
     }
 

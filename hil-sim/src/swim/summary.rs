@@ -87,7 +87,7 @@ pub struct NodeSummary {
     /// Largest torque of its motors, N·m.
     pub peak_torque_nm: f64,
     /// Largest angle between reference and true pose, rad.
-    pub max_tracking_error_rad: f64,
+    pub max_tracking_error_rad: Option<f64>,
     /// Largest yaw, rad.
     pub peak_yaw_rad: f64,
 }
@@ -210,13 +210,16 @@ impl fmt::Display for Summary {
             "\n  vertebra   peak yaw   peak torque   worst tracking error"
         )?;
         for node in &self.nodes {
+            let error = node.max_tracking_error_rad.map_or_else(
+                || "   in QEMU".to_owned(),
+                |error| format!("{:8.2} mrad", error * 1e3),
+            );
             writeln!(
                 out,
-                "  {:8}   {:6.2}°   {:7.2} N·m   {:8.2} mrad",
+                "  {:8}   {:6.2}°   {:7.2} N·m   {error}",
                 node.node,
                 node.peak_yaw_rad.to_degrees(),
                 node.peak_torque_nm,
-                node.max_tracking_error_rad * 1e3,
             )?;
         }
         writeln!(out, "\n  frame log SHA-256  {}", self.frame_log_sha256)?;

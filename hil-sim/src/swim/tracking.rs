@@ -9,7 +9,7 @@ use crate::robot::NODES;
 /// The worst of each vertebra so far.
 #[derive(Clone, Debug, Default)]
 pub struct Tracking {
-    error_rad: [f64; NODES],
+    error_rad: [Option<f64>; NODES],
     torque_nm: [f64; NODES],
     yaw_rad: [f64; NODES],
 }
@@ -24,7 +24,13 @@ impl Tracking {
     pub fn note_pose(&mut self, index: usize, reference: &Pose, truth: [f64; 3]) {
         let wanted = [reference.yaw, reference.pitch, reference.roll].map(radians);
         let error = angle_between(wanted, truth);
-        self.error_rad[index] = self.error_rad[index].max(error);
+        let worst = &mut self.error_rad[index];
+        *worst = Some(worst.map_or(error, |before| before.max(error)));
+        self.note_yaw(index, truth);
+    }
+
+    /// Takes the true yaw, pitch and roll of a vertebra whose reference nobody knows, rad.
+    pub fn note_yaw(&mut self, index: usize, truth: [f64; 3]) {
         self.yaw_rad[index] = self.yaw_rad[index].max(truth[0].abs());
     }
 
@@ -37,7 +43,7 @@ impl Tracking {
 
     /// Returns the worst angle between reference and truth of all vertebrae, rad.
     pub fn worst_error(&self) -> f64 {
-        self.error_rad.iter().copied().fold(0.0, f64::max)
+        self.error_rad.iter().copied().flatten().fold(0.0, f64::max)
     }
 
     /// Returns the largest torque of any motor, N·m.
