@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
-use crate::active::{Head, Lss, Nmt, Nodes, Read, Store, Write};
+use crate::active::{Faults, Head, Lss, Nmt, Nodes, Read, Scope, Store, Write};
 use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
 use crate::source::Limits;
@@ -31,6 +31,8 @@ Examples:
   eel nodes                                   who is on the bus, and how they are
   eel read 3 pose.yaw                         one value of vertebra 3, in rad
   eel write 3 gains.peak_torque=2.5           in N.m, range-checked
+  eel faults 3                                what stopped vertebra 3, and how it was
+  eel scope 3 pose.yaw motor.angle1           every millisecond for half a second, plotted
   eel head vcan0 --gait swim --seconds 20     lead simulated vertebrae through a gait
   eel wrist ik --yaw 20 --degrees             motor angles for a pose; eel wrist --help says more";
 
@@ -59,6 +61,8 @@ pub enum Command {
     Wrist(Wrist),
     Nodes(Nodes),
     Read(Read),
+    Faults(Faults),
+    Scope(Scope),
     Write(Write),
     Nmt(Nmt),
     Lss(Lss),
@@ -74,7 +78,9 @@ const GROUPS: [(&str, &[&str]); 3] = [
     ),
     (
         "Ask and command nodes (these send)",
-        &["nodes", "read", "write", "nmt", "lss", "store", "head"],
+        &[
+            "nodes", "read", "write", "faults", "scope", "nmt", "lss", "store", "head",
+        ],
     ),
     ("Without a bus", &["export", "wrist"]),
 ];

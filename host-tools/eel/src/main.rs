@@ -59,6 +59,8 @@ fn main() -> ExitCode {
         Command::Wrist(wrist) => wrist::run(&wrist),
         Command::Nodes(nodes) => nodes.run(),
         Command::Read(read) => read.run(),
+        Command::Faults(faults) => faults.run(),
+        Command::Scope(scope) => scope.run(),
         Command::Write(write) => write.run(),
         Command::Nmt(nmt) => nmt.run(),
         Command::Lss(lss) => lss.run(),

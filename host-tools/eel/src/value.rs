@@ -105,7 +105,8 @@ impl Value {
     }
 }
 
-fn physical(object: &Object, raw: i64) -> f64 {
+/// Returns a raw number in the object's unit.
+pub fn physical(object: &Object, raw: i64) -> f64 {
     let scale = object.scale;
     (raw * i64::from(scale.numerator)) as f64 / f64::from(scale.denominator)
 }

@@ -48,6 +48,26 @@ fn wrong_names_and_values_are_told_before_a_bus_is_opened() {
     refused(&["head", "vcan0", "--amplitude", "-1"], 2, "");
     refused(&["head", "vcan0", "--nodes", "11"], 2, "each 1 to 10");
     refused(&["lss", "assign", "0"], 2, "0 is not in 1..=126");
+    refused(
+        &["scope", "3", "pose"],
+        2,
+        "pose is a group: name up to four of pose.yaw",
+    );
+    refused(&["scope", "3", "pose.jaw"], 2, "pose has yaw, pitch, roll");
+    refused(
+        &["scope", "3", "eds.data"],
+        2,
+        "eds.data can't be captured: the scope takes numbers from 0x2000 on",
+    );
+    let five = ["pose.yaw"; 5];
+    refused(
+        &[&["scope", "3"], &five[..]].concat(),
+        2,
+        "takes four signals at a time, not 5",
+    );
+    refused(&["scope", "3", "pose.yaw", "--every", "0"], 2, "1..=65535");
+    refused(&["scope", "3"], 2, "<SIGNAL>");
+    refused(&["faults", "0"], 2, "write head or a number 1 to 127");
     refused(&["store", "3", "burn"], 2, "possible values: save, restore");
 }
 
@@ -81,6 +101,8 @@ fn what_can_move_a_robot_needs_consent_on_a_cable() {
         &["write", "-b", "cable0", "3", "gains.peak_torque=1"],
         &["store", "-b", "cable0", "3"],
         &["nodes", "cable0"],
+        &["faults", "-b", "cable0"],
+        &["scope", "-b", "cable0", "3", "pose.yaw", "--on-fault"],
         &["lss", "-b", "cable0", "scan"],
     ] {
         let (code, _, err) = eel(arguments);
@@ -105,7 +127,9 @@ fn a_recording_is_not_sent_to() {
 
 #[test]
 fn every_command_explains_itself_with_examples_exit_codes_and_schema() {
-    for name in ["nodes", "read", "write", "nmt", "lss", "store", "head"] {
+    for name in [
+        "nodes", "read", "write", "faults", "scope", "nmt", "lss", "store", "head",
+    ] {
         let (code, out, _) = eel(&[name, "--help"]);
         assert_eq!(code, 0);
         for words in [

@@ -1,4 +1,4 @@
-//! `eel nodes`, `read`, `write`, `nmt`, `store`, `lss` and `head` against simulated vertebrae.
+//! `eel nodes`, `read`, `write`, `faults`, `scope`, `nmt`, `store`, `lss` and `head` against simulated vertebrae.
 
 use std::env;
 use std::io::{BufRead, BufReader};
@@ -230,6 +230,78 @@ fn the_head_stops_in_order_when_the_system_ends_it_or_nobody_reads_it() {
         let all = eel(&name, &["nodes", "--json"]).1;
         assert_eq!(all.matches("\"pre-operational\"").count(), 2, "{all}");
     }
+}
+
+/// A vertebra that is taken out of operation while it moves has a frozen frame and a capture around it.
+#[test]
+fn a_stop_is_captured_by_the_scope_and_told_by_the_freeze_frame() {
+    let Some(name) = interface() else { return };
+    let _nodes = start(&name);
+    let (code, out, err) = eel(&name, &["faults"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(
+        out.matches("nothing has gone wrong since power-up").count(),
+        2,
+        "{out}"
+    );
+    let capture = json(
+        &name,
+        &["scope", "3", "pose.yaw", "health.supply", "--json"],
+    );
+    assert_eq!(
+        (&capture["state"], &capture["every_ms"]),
+        (&"full".into(), &1.into())
+    );
+    for signal in capture["signals"].as_array().expect("an array") {
+        assert_eq!(signal["values"].as_array().map(Vec::len), Some(512));
+    }
+
+    let mut head = Command::new(program())
+        .args(["head", &name, "--nodes", "3,5", "--seconds", "20", "--json"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("a program");
+    let mut lines = BufReader::new(head.stdout.take().expect("a pipe")).lines();
+    let runs = |line: &String| line.contains("gait-started");
+    assert!(lines.by_ref().map_while(Result::ok).any(|line| runs(&line)));
+    let words = [
+        "scope",
+        "3",
+        "pose.yaw",
+        "--on-fault",
+        "--seconds",
+        "20",
+        "--json",
+    ];
+    let scope = Command::new(program())
+        .args(words)
+        .env("EEL_BUS", &name)
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("a program");
+    // It captures before the stop comes.
+    let waits = || eel(&name, &["read", "3", "scope.state"]).1.contains(" 2");
+    assert!((0..50).any(|_| waits()));
+    assert_eq!(eel(&name, &["nmt", "3", "pre-operational"]).0, 0);
+    let captured = scope.wait_with_output().expect("it ends");
+    let captured: Value = serde_json::from_slice(&captured.stdout).expect("JSON");
+    assert!(
+        captured["fault"].is_u64() && captured["state"] == "full",
+        "{captured}"
+    );
+
+    let told = json(&name, &["faults", "3", "--json"]);
+    let frame = &told[0]["frame"];
+    assert_eq!(frame["name"], "stopped-by-nmt", "{told}");
+    assert_eq!((&frame["motor"], &frame["count"]), (&0.into(), &1.into()));
+    let (code, out, err) = eel(&name, &["faults", "3", "7"]);
+    assert_eq!(code, 1);
+    assert!(out.contains("advice       An NMT command took"), "{out}");
+    assert!(err.contains("node 7 does not answer"), "{err}");
+    let process = head.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &process]).status();
+    assert!(sent.is_ok_and(|status| status.success()));
+    head.wait().expect("it ends");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use std::time::Duration;
 use eel_client::{
     Client, ClientError, LssAddress, Method, Multiplexor, NmtCommand, NmtState, Progress,
 };
+use eel_protocol::scope::{ScopeHeader, ScopeState};
 use eel_protocol::{Frame, NodeId, identity};
 use eel_transport::{Bus, BusError, MemoryBus, Received, pair};
 use hil_sim::plant::Config;
@@ -368,4 +369,46 @@ fn what_is_stored_outlasts_a_reset_until_it_is_restored() {
     let restore_all = Multiplexor::new(0x1011, 1);
     write(&mut client, 3, restore_all, b"load", Method::Automatic);
     assert_eq!(reset(&mut client), (200, 3_000), "all was restored");
+}
+
+/// What `eel scope` and `eel faults` do on the bus, and what they take apart.
+#[test]
+fn the_scope_fills_its_memory_and_there_is_no_freeze_frame_before_a_fault() {
+    let (_nodes, bus) = Nodes::start(&[3], &[]);
+    let mut client = client(bus);
+    await_boot(&mut client, 3);
+    let freeze = Multiplexor::new(0x2100, 1);
+    let none = client.upload(3, freeze, Method::Automatic, &mut |_| ());
+    assert!(
+        matches!(none, Err(ClientError::Aborted { code, .. }) if code == 0x0800_0024),
+        "{none:?}"
+    );
+
+    let channels = [0x2012_0120, 0x2030_0110, 0, 0_u32];
+    let scope = |subindex| Multiplexor::new(0x2050, subindex);
+    for (subindex, raw) in (1..).zip(channels) {
+        let raw = raw.to_le_bytes();
+        write(&mut client, 3, scope(subindex), &raw, Method::Automatic);
+    }
+    write(&mut client, 3, scope(6), &[1], Method::Automatic);
+    while client.number(3, scope(7)).unwrap() != ScopeState::Full as u32 {
+        client.listen(Duration::from_millis(20)).unwrap();
+    }
+    let record = read(
+        &mut client,
+        3,
+        Multiplexor::new(0x2100, 2),
+        Method::Automatic,
+    );
+    let (header, samples) = ScopeHeader::from_bytes(&record).unwrap();
+    assert_eq!((header.channels, header.samples), (channels, 512));
+    assert_eq!((header.state, header.fault), (ScopeState::Full, None));
+    let (words, _) = samples.as_chunks::<4>();
+    let supply: Vec<_> = words.iter().skip(1).step_by(2).collect();
+    assert!(
+        supply
+            .iter()
+            .all(|word| (20_000..30_000).contains(&i32::from_le_bytes(**word))),
+        "about 24 V"
+    );
 }

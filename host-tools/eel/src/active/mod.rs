@@ -1,13 +1,15 @@
-//! The commands that send: bring-up of nodes, and the head.
+//! The commands that send: bring-up of nodes, their faults and signals, and the head.
 
 mod bus;
 mod events;
+mod faults;
 mod head;
 mod live;
 mod lss;
 mod nmt;
 mod nodes;
 mod read;
+mod scope;
 mod store;
 mod write;
 
@@ -19,13 +21,18 @@ use eel_protocol::{HEAD_NODE, VERTEBRAE};
 
 use crate::usage::Usage;
 
+pub use faults::Faults;
 pub use head::Head;
 pub use lss::Lss;
 pub use nmt::Nmt;
 pub use nodes::Nodes;
 pub use read::Read;
+pub use scope::Scope;
 pub use store::Store;
 pub use write::Write;
+
+/// The abort code of an object that exists and holds nothing now.
+const NO_DATA: u32 = 0x0800_0024;
 
 /// No bus to work on: exit code 3.
 #[derive(Debug)]

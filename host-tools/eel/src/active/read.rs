@@ -8,14 +8,12 @@ use clap::Args;
 use eel_client::{Client, ClientError, Method, Progress};
 use serde_json::json;
 
-use super::Node;
 use super::bus::{AnyBus, BusOption};
+use super::{NO_DATA, Node};
 use crate::object::{self, Kind, Object};
 use crate::usage::Usage;
 use crate::value::Value;
 
-/// The abort code of an object that exists and holds nothing now.
-const NO_DATA: u32 = 0x0800_0024;
 /// Bytes from which on a transfer shows how far it is.
 const LONG: usize = 2_000;
 

@@ -14,7 +14,7 @@ mod place;
 mod share;
 mod sketch;
 mod statics;
-mod svg;
+pub mod svg;
 
 use std::fmt;
 use std::io::{BufWriter, Write, stdout};
