@@ -38,6 +38,10 @@ const SILENCE: std::ops::Range<usize> = 3_800..7_000;
 const STORED: usize = 6_500;
 /// When the vertebra is powered up again, among garbage.
 const SECOND_START: usize = 6_800;
+/// Most instructions that half of the turns may take in which the motors are driven.
+const MEDIAN_BUDGET: u64 = 6_000;
+/// Most instructions of one turn of this script, a turn with a target outside the workspace and garbage.
+const WORST_BUDGET: u64 = 12_000;
 /// Longest time that QEMU may take.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -50,8 +54,9 @@ fn gives_the_same_bits_as_natively() {
     let script = spoil(record(node), node);
     let expected = run_natively(&script);
     check_that_much_happened(&expected);
-    let found = run_in_qemu(&emulator, &image, &script);
+    let (found, said) = run_in_qemu(&emulator, &image, &script);
     compare(&expected, &found);
+    check_cost(&said);
 }
 
 /// Finds QEMU and the image. Says what is missing, and fails for that only in CI.
@@ -303,8 +308,24 @@ fn check_that_much_happened(outputs: &[Output]) {
     assert!(heartbeats >= 4, "nothing was stored: {heartbeats}");
 }
 
-/// Runs the image, and returns its answers.
-fn run_in_qemu(emulator: &Path, image: &Path, script: &[Step]) -> Vec<u8> {
+/// Holds what the turns cost against the budget; instructions in virtual time are the same in every run.
+fn check_cost(said: &str) {
+    let before = |unit: &str| {
+        let words: Vec<&str> = said.split([' ', ',']).collect();
+        let place = words.iter().position(|word| *word == unit);
+        let number = place.and_then(|place| words.get(place.checked_sub(1)?)?.parse().ok());
+        number.unwrap_or_else(|| panic!("no {unit} in {said:?}"))
+    };
+    let (median, worst): (u64, u64) = (before("median"), before("worst"));
+    assert!(
+        median <= MEDIAN_BUDGET,
+        "half of the turns take {median} instructions and more"
+    );
+    assert!(worst <= WORST_BUDGET, "a turn takes {worst} instructions");
+}
+
+/// Runs the image, and returns its answers and what it said.
+fn run_in_qemu(emulator: &Path, image: &Path, script: &[Step]) -> (Vec<u8>, String) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("qemu");
     fs::create_dir_all(&folder).expect("a folder");
     let mut input = Vec::new();
@@ -355,7 +376,8 @@ fn run_in_qemu(emulator: &Path, image: &Path, script: &[Step]) -> Vec<u8> {
         said.trim()
     );
     assert!(status.success(), "the image failed: {status}, {said}");
-    fs::read(folder.join("lockstep.out")).expect("the output")
+    let answers = fs::read(folder.join("lockstep.out")).expect("the output");
+    (answers, said.trim().to_owned())
 }
 
 /// Compares the answers of the image, packet by packet.

@@ -8,6 +8,10 @@ use crate::stopwatch::Stopwatch;
 
 const INSTRUCTIONS: u64 = 1_000;
 const TICKS: u64 = 168;
+/// Instructions that count as the same where the median is looked for.
+const GRAIN: u64 = 64;
+/// Grains that are told apart; longer turns count as the last.
+const GRAINS: usize = 256;
 
 /// Counts the instructions of turns.
 pub struct Meter {
@@ -15,6 +19,9 @@ pub struct Meter {
     turns: u64,
     total: u64,
     worst: u64,
+    driven: u64,
+    /// How many driven turns took so many grains.
+    spread: [u32; GRAINS],
 }
 
 /// What the turns took.
@@ -24,6 +31,8 @@ pub struct Reading {
     pub turns: u64,
     /// Instructions of a turn, mean.
     pub mean: u64,
+    /// Instructions that half of the turns in which the motors are driven don't exceed, rounded up to the grain of 64.
+    pub median: u64,
     /// Instructions of the longest turn.
     pub worst: u64,
 }
@@ -36,16 +45,30 @@ impl Meter {
             turns: 0,
             total: 0,
             worst: 0,
+            driven: 0,
+            spread: [0; GRAINS],
         }
     }
 
-    /// Does a turn and counts it.
-    pub fn count<Result>(&mut self, turn: impl FnOnce() -> Result) -> Result {
+    /// Does a turn and counts it, for the median only where it is a driven one.
+    pub fn count<Result>(
+        &mut self,
+        turn: impl FnOnce() -> Result,
+        is_driven: impl FnOnce(&Result) -> bool,
+    ) -> Result {
         let (result, ticks) = self.stopwatch.time(turn);
         let instructions = u64::from(ticks) * INSTRUCTIONS / TICKS;
         self.turns += 1;
         self.total += instructions;
         self.worst = self.worst.max(instructions);
+        if !is_driven(&result) {
+            return result;
+        }
+        self.driven += 1;
+        let grain = (instructions / GRAIN).min(GRAINS as u64 - 1) as usize;
+        if let Some(count) = self.spread.get_mut(grain) {
+            *count += 1;
+        }
         result
     }
 
@@ -55,6 +78,16 @@ impl Meter {
             turns: self.turns,
             mean: self.total / self.turns.max(1),
             worst: self.worst,
+            median: self.median(),
         }
+    }
+
+    fn median(&self) -> u64 {
+        let mut counted = 0;
+        let half = self.spread.iter().position(|count| {
+            counted += u64::from(*count);
+            counted * 2 >= self.driven
+        });
+        half.map_or(0, |grain| (grain as u64 + 1) * GRAIN)
     }
 }

@@ -5,12 +5,12 @@ use crate::machine::{divide, divide_unsigned, multiply_high_add};
 /// Returns the nearest `i32`.
 #[inline(always)]
 pub const fn saturate(value: i64) -> i32 {
-    if value > i32::MAX as i64 {
-        i32::MAX
-    } else if value < i32::MIN as i64 {
-        i32::MIN
+    let low = value as i32;
+    if low as i64 == value {
+        low
     } else {
-        value as i32
+        // The end on the side of the sign.
+        (value >> 63) as i32 ^ i32::MAX
     }
 }
 

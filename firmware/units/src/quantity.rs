@@ -40,13 +40,8 @@ macro_rules! quantity {
             /// Returns the value within `low..=high`; `low` wins where the two are crossed.
             #[inline]
             pub const fn bounded(self, low: Self, high: Self) -> Self {
-                if self.0 > high.0 && high.0 >= low.0 {
-                    high
-                } else if self.0 < low.0 || high.0 < low.0 {
-                    low
-                } else {
-                    self
-                }
+                let held = if self.0 > high.0 { high } else { self };
+                if held.0 < low.0 { low } else { held }
             }
         }
 

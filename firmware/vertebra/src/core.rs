@@ -43,7 +43,8 @@ pub(crate) struct Core {
     pub stream: CommandStream,
     pub spline: Spline,
     pub hold: Pose,
-    pub motion: Option<Motion>,
+    /// Whether the motors' angles are those of a pose, which is measured then.
+    pub has_pose: bool,
     pub pose: Pose,
     pub target: ReceivedTarget,
     /// The identifier of a target that waits for SYNC.
@@ -93,7 +94,7 @@ impl Core {
             stream: CommandStream::new(now),
             spline: Spline::at_rest(Pose::default()),
             hold: Pose::default(),
-            motion: None,
+            has_pose: false,
             pose: Pose::default(),
             target: ReceivedTarget::default(),
             arrived: None,
@@ -138,7 +139,7 @@ impl Core {
     pub fn tick(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
         self.now = now;
         self.sample = Some(*sample);
-        self.estimate(sample);
+        let motion = self.estimate(sample);
         self.watch(sample);
         self.bridge_missing_targets();
         if now.since(self.feed_since) >= TARGET_TIMEOUT {
@@ -149,7 +150,7 @@ impl Core {
         self.machine
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
-        let drives = self.drive(sample);
+        let drives = self.drive(motion.as_ref(), sample);
         for (state, drive) in self.currents.iter_mut().zip(&drives) {
             state.note_drive(drive);
         }
@@ -159,8 +160,8 @@ impl Core {
         drives
     }
 
-    /// Turns readings into angles, speeds and the pose.
-    fn estimate(&mut self, sample: &Sample) {
+    /// Turns readings into angles, speeds and the pose, and returns what the wrist does.
+    fn estimate(&mut self, sample: &Sample) -> Option<Motion> {
         let readings = sample.encoder_counts.into_iter().zip(sample.absolute);
         for (motor, (encoder, (count, absolute))) in
             self.encoders.iter_mut().zip(readings).enumerate()
@@ -179,11 +180,11 @@ impl Core {
             self.pending.fault(emergency, Some(motor), 0);
         }
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
-        self.motion = None;
+        let mut found = None;
         if aligned {
             match self.moving() {
                 Ok(motion) => {
-                    self.motion = Some(motion);
+                    let motion = found.insert(motion);
                     self.pose = motion.direct.rotation.to_pose();
                     self.find_residual();
                 }
@@ -197,7 +198,9 @@ impl Core {
                 Err(_) => {}
             }
         }
+        self.has_pose = found.is_some();
         self.take_faults();
+        found
     }
 
     /// Returns where the wrist is and how it moves.
@@ -258,7 +261,7 @@ impl Core {
     }
 
     /// Returns what the bridges do until the next tick.
-    fn drive(&mut self, sample: &Sample) -> [Drive; 3] {
+    fn drive(&mut self, motion: Option<&Motion>, sample: &Sample) -> [Drive; 3] {
         self.reference = None;
         self.achieved = [Torque::ZERO; 3];
         self.unallocated = [Torque::ZERO; 3];
@@ -273,18 +276,18 @@ impl Core {
                 return [Drive::Off; 3];
             }
         };
-        let Some(motion) = self.motion else {
+        let Some(motion) = motion else {
             return [Drive::Brake; 3];
         };
         let moment = match self.machine.state() {
             State::Run => {
                 let (elapsed, period) = self.stream.place(self.now);
-                self.pull(&motion, self.spline.reference(elapsed, period))
+                self.pull(motion, self.spline.reference(elapsed, period))
             }
-            State::Hold => self.pull(&motion, Reference::at_rest(self.hold)),
-            _ => self.impedance.damping(&motion),
+            State::Hold => self.pull(motion, Reference::at_rest(self.hold)),
+            _ => self.impedance.damping(motion),
         };
-        self.share(&motion, moment, cap, sample)
+        self.share(motion, moment, cap, sample)
     }
 
     /// Returns the moment towards a reference, and remembers how far off the wrist is.

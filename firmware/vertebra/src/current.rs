@@ -147,7 +147,11 @@ impl Electrical {
         state.saturated = applied != voltage;
         state.applied_mv = Some(applied);
         state.emf_mv = emf;
-        Duty::from_q15(((applied * 32_767) / supply) as i32)
+        // The machine divides 32 bits itself, and no supply has more millivolts than 16.
+        Duty::from_q15(match u16::try_from(supply) {
+            Ok(supply) => applied as i32 * 32_767 / i32::from(supply).max(1),
+            Err(_) => (applied * 32_767 / supply) as i32,
+        })
     }
 
     /// Returns the current of a torque, within the bridge's limit.

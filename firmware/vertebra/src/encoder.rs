@@ -16,6 +16,8 @@ const INVALID_LIMIT: u8 = 50;
 const SPEED_GAIN: i64 = 90;
 /// Correction of the position per tick: 2 ω₀ Δt in Q16.
 const POSITION_GAIN: i64 = 39_322;
+/// The largest error that is followed, 512 rad in Q37: the gains have room for it, no crank has.
+const FAR: i64 = 1 << 46;
 /// One tick in Q24 rad/s → Q29 rad: 2⁵/1000 in Q16.
 const TICK: i64 = 2_097;
 
@@ -41,6 +43,8 @@ pub struct Encoder {
     align_sum: i64,
     align_count: u32,
     zero: i64,
+    /// What the crank's angle was at the last tick.
+    angle: Angle,
     implausible: u8,
     invalid: u8,
     observer: Observer,
@@ -77,6 +81,7 @@ impl Encoder {
             align_sum: 0,
             align_count: 0,
             zero: 0,
+            angle: Angle::ZERO,
             implausible: 0,
             invalid: 0,
             observer: Observer {
@@ -99,7 +104,8 @@ impl Encoder {
         }
         let jumped = count.wrapping_sub(self.last_count).unsigned_abs() > self.step_limit;
         self.last_count = count;
-        let counted = self.counted();
+        let counted = self.count();
+        self.angle = Angle::from_q29(saturate(self.zero + counted));
         if !self.is_aligned() {
             return self.align(counted, absolute, jumped);
         }
@@ -130,8 +136,8 @@ impl Encoder {
 
     /// Returns the crank's angle; wrong by a count (71 µrad) and by the absolute encoder's mean
     /// error.
-    pub fn angle(&self) -> Angle {
-        Angle::from_q29(saturate(self.zero + self.counted()))
+    pub const fn angle(&self) -> Angle {
+        self.angle
     }
 
     /// Returns the crank's speed, low-passed at 300 rad/s.
@@ -161,6 +167,7 @@ impl Encoder {
         self.align_count += 1;
         if self.is_aligned() {
             self.zero = self.align_sum / i64::from(ALIGN_SAMPLES);
+            self.angle = Angle::from_q29(saturate(self.zero + counted));
             self.observer = Observer {
                 position: (self.zero + counted) << 8,
                 speed: 0,
@@ -175,7 +182,7 @@ impl Encoder {
     }
 
     /// Returns the angle counted since the first reading, Q29.
-    fn counted(&self) -> i64 {
+    fn count(&self) -> i64 {
         let counts = i64::from(self.last_count.wrapping_sub(self.reference_count));
         (counts.wrapping_mul(self.scale)) >> 16
     }
@@ -195,17 +202,12 @@ impl Observer {
     /// Advances by one tick towards the measured `angle`, Q29.
     fn follow(&mut self, angle: i64) {
         let predicted = self.position.saturating_add((self.speed * TICK) >> 8);
-        let error = (angle << 8).saturating_sub(predicted);
-        self.position = predicted.saturating_add(scaled(error, POSITION_GAIN));
+        let error = (angle << 8).saturating_sub(predicted).max(-FAR).min(FAR);
+        self.position = predicted.saturating_add((error * POSITION_GAIN) >> 16);
         // Q37 rad × 1/s is Q37 rad/s; the speed is Q24.
-        let change = error.saturating_mul(SPEED_GAIN) >> 13;
+        let change = (error * SPEED_GAIN) >> 13;
         self.speed = i64::from(saturate(self.speed.saturating_add(change)));
     }
-}
-
-/// Multiplies by a gain in Q16 without overflow for any error.
-fn scaled(value: i64, gain: i64) -> i64 {
-    value.saturating_mul(gain) >> 16
 }
 
 #[cfg(test)]

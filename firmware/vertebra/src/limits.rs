@@ -152,7 +152,11 @@ fn share(ramp: Ramp<Temperature>, value: Temperature) -> i64 {
 fn fraction(from: i32, to: i32, value: i32) -> i64 {
     let span = (i64::from(to) - i64::from(from)).max(1);
     let part = (i64::from(value) - i64::from(from)).clamp(0, span);
-    (part << 15) / span
+    // The machine divides 32 bits itself, and no ramp is longer.
+    match u16::try_from(span) {
+        Ok(span) => i64::from(((part as u32) << 15) / u32::from(span).max(1)),
+        Err(_) => (part << 15) / span,
+    }
 }
 
 /// Multiplies by a share in Q15.

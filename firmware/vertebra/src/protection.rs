@@ -47,7 +47,7 @@ impl Core {
     fn note_refusals(&mut self, sample: &Sample) {
         let limits = &self.settings.limits;
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
-        let believable = self.motion.is_some() && is_believable(&self.pose, limits);
+        let believable = self.has_pose && is_believable(&self.pose, limits);
         let hot = sample.board_temperature >= limits.board_hot.end
             || sample
                 .motor_temperature
