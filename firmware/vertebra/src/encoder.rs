@@ -202,7 +202,7 @@ impl Observer {
     /// Advances by one tick towards the measured `angle`, Q29.
     fn follow(&mut self, angle: i64) {
         let predicted = self.position.saturating_add((self.speed * TICK) >> 8);
-        let error = (angle << 8).saturating_sub(predicted).max(-FAR).min(FAR);
+        let error = (angle << 8).saturating_sub(predicted).clamp(-FAR, FAR);
         self.position = predicted.saturating_add((error * POSITION_GAIN) >> 16);
         // Q37 rad × 1/s is Q37 rad/s; the speed is Q24.
         let change = (error * SPEED_GAIN) >> 13;
