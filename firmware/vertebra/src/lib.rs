@@ -42,7 +42,7 @@ mod workspace;
 pub use command::TARGET_TIMEOUT;
 pub use eel_canopen::Identifiers;
 pub use events::Event;
-pub use io::{Drive, Sample};
+pub use io::{Actions, Drive, Sample};
 pub use machine::{STOP_BRAKE, STOP_DAMPED};
 pub use settings::{Gains, Limits, Motor, Ramp, Settings, Travel};
 pub use vertebra::{Vertebra, turn};

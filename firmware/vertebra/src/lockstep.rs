@@ -11,10 +11,10 @@ use eel_units::{Angle, Current, Duty, Instant, Temperature, Voltage};
 use embedded_can::{ExtendedId, StandardId};
 use heapless::Vec;
 
-use crate::io::{Drive, Sample};
+use crate::io::{Actions, Drive, Sample};
 
 /// The layout; another one has another number.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 /// The most frames of a packet: more than a node queues.
 pub const MAX_FRAMES: usize = 32;
 /// Length of a header in bytes.
@@ -25,9 +25,9 @@ pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + 1 + MAX_FRAMES * FRAM
 const TIME: usize = 8;
 const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1;
 const FRAME: usize = 4 + 1 + 8;
-const DRIVES: usize = 3 * (1 + 4);
+const ACTIONS: usize = 3 * (1 + 4) + 1 + 4;
 
-const _: () = assert!(DRIVES + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
+const _: () = assert!(ACTIONS + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
 
 const EXTENDED: u32 = 1 << 31;
@@ -96,8 +96,8 @@ pub struct Input {
 /// What a vertebra makes of a turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// What the bridges do.
-    pub drives: [Drive; 3],
+    /// What it does until the next one.
+    pub actions: Actions,
     /// What it sends, in this order.
     pub frames: Frames,
 }
@@ -246,7 +246,7 @@ impl Output {
     /// Makes the packet.
     pub fn encode(&self) -> Packet {
         let mut packet = Packet::new(Kind::Output);
-        for drive in self.drives {
+        for drive in self.actions.drives {
             let (code, duty) = match drive {
                 Drive::Off => (0, 0),
                 Drive::Brake => (1, 0),
@@ -255,6 +255,8 @@ impl Output {
             packet.put(&[code]);
             packet.put_i32(duty);
         }
+        packet.put(&[u8::from(self.actions.chain_out)]);
+        packet.put_i32(self.actions.tick_trim_ns);
         packet.put_frames(&self.frames);
         packet.finish()
     }
@@ -274,9 +276,19 @@ impl Output {
                 _ => return Err(PacketError::Value),
             };
         }
+        let chain_out = match reader.take_u8()? {
+            0 => false,
+            1 => true,
+            _ => return Err(PacketError::Value),
+        };
+        let actions = Actions {
+            drives,
+            chain_out,
+            tick_trim_ns: reader.take_i32()?,
+        };
         let frames = reader.take_frames()?;
         reader.finish()?;
-        Ok(Self { drives, frames })
+        Ok(Self { actions, frames })
     }
 }
 
@@ -299,7 +311,8 @@ fn put_sample(packet: &mut Packet, sample: &Sample) {
         packet.put_i32(temperature.to_decidegrees());
     }
     let stop = u8::from(sample.emergency_stop) << 3;
-    packet.put(&[to_bits(sample.bridge_fault) | stop]);
+    let chain = u8::from(sample.chain_in) << 4;
+    packet.put(&[to_bits(sample.bridge_fault) | stop | chain]);
 }
 
 fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
@@ -326,8 +339,9 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
         supply,
         board_temperature,
         motor_temperature,
-        bridge_fault: from_bits(flags & !(1 << 3))?,
+        bridge_fault: from_bits(flags & !(3 << 3))?,
         emergency_stop: flags & 1 << 3 != 0,
+        chain_in: flags & 1 << 4 != 0,
     })
 }
 

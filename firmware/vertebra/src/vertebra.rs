@@ -13,7 +13,7 @@ use eel_units::{Angle, Duration, Instant};
 use crate::core::Core;
 use crate::events::Event;
 use crate::freezing::Clock;
-use crate::io::{Drive, Sample};
+use crate::io::{Actions, Sample};
 use crate::records::Records;
 use crate::served::Served;
 use crate::settings::Settings;
@@ -52,18 +52,18 @@ pub fn turn(
     sample: &Sample,
     room: usize,
     mut send: impl FnMut(Frame),
-) -> [Drive; 3] {
+) -> Actions {
     for frame in frames {
         vertebra.handle_frame(now, &frame);
     }
-    let drives = vertebra.handle_sample(now, sample);
+    let actions = vertebra.handle_sample(now, sample);
     for _ in 0..room {
         let Some(frame) = vertebra.poll_transmit() else {
             break;
         };
         send(frame);
     }
-    drives
+    actions
 }
 
 impl Vertebra {
@@ -124,9 +124,9 @@ impl Vertebra {
         self.hand_over_emergencies(now);
     }
 
-    /// Takes the measurements of a control tick, once per millisecond, and returns what the
-    /// bridges do until the next.
-    pub fn handle_sample(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
+    /// Takes the measurements of a control tick, once per millisecond, and returns what to do
+    /// until the next.
+    pub fn handle_sample(&mut self, now: Instant, sample: &Sample) -> Actions {
         self.core.now = now;
         let mut served = Served {
             core: &mut self.core,
@@ -141,7 +141,10 @@ impl Vertebra {
         };
         served.capture();
         self.hand_over_emergencies(now);
-        drives
+        Actions {
+            drives,
+            ..Actions::IDLE
+        }
     }
 
     /// Returns the next frame to send.

@@ -14,7 +14,7 @@ use anyhow::{Context, bail, ensure};
 use eel_protocol::{Frame, NodeId, PoseReport, State};
 use eel_units::Instant;
 use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, MAX_FRAMES, Output, Start};
-use eel_vertebra::{Drive, Event, Sample, Vertebra};
+use eel_vertebra::{Actions, Event, Sample, Vertebra};
 use tempfile::TempDir;
 
 use super::node::{Node, prototype};
@@ -144,9 +144,9 @@ impl Node for QemuNode {
         sample: &Sample,
         room: usize,
         sent: &mut Vec<Frame>,
-    ) -> [Drive; 3] {
+    ) -> Actions {
         if self.failure.is_some() {
-            return [Drive::Off; 3];
+            return Actions::IDLE;
         }
         let input = Input {
             now,
@@ -170,11 +170,11 @@ impl Node for QemuNode {
                     }
                 }
                 sent.extend(output.frames);
-                output.drives
+                output.actions
             }
             Err(error) => {
                 self.fail(error);
-                [Drive::Off; 3]
+                Actions::IDLE
             }
         }
     }

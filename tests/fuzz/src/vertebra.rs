@@ -53,6 +53,7 @@ impl Bench {
                 motor_temperature: [Temperature::from_decidegrees(250); 3],
                 bridge_fault: [false; 3],
                 emergency_stop: false,
+                chain_in: false,
             },
             now,
             counter: Counter::default(),
@@ -164,7 +165,7 @@ impl Bench {
 
     fn tick(&mut self) {
         self.now = self.now + Duration::from_millis(1);
-        let drives = self.vertebra.handle_sample(self.now, &self.sample);
+        let drives = self.vertebra.handle_sample(self.now, &self.sample).drives;
         let state = self.vertebra.state();
         for drive in drives {
             if let Drive::Duty(duty) = drive {
