@@ -16,6 +16,9 @@ mod chosen_nodes;
 #[path = "socketcan/dissect.rs"]
 mod dissect;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/driving.rs"]
+mod driving;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/nodes.rs"]
 mod nodes;
 #[cfg(target_os = "linux")]

@@ -164,6 +164,8 @@ fn codes_are_these_numbers() {
         (2, "damped"),
         (3, "hold"),
         (4, "run"),
+        (5, "moment"),
+        (6, "motor"),
         (15, "fault-reset"),
     ];
     assert_eq!(modes, pinned);
@@ -183,6 +185,8 @@ fn codes_are_these_numbers() {
         (8, "stop-brake"),
         (9, "stop-off"),
         (10, "fault"),
+        (12, "moment"),
+        (13, "motor"),
     ];
     assert_eq!(states, pinned);
     let limits: Vec<_> = LimitCode::ALL

@@ -3,7 +3,7 @@
 use eel_kinematics::Pose;
 use eel_protocol::emergency::EmergencyReport;
 use eel_protocol::{
-    Cob, Frame, FrameError, HEAD_HEARTBEAT_MS, HEAD_NODE, NodeId, PoseReport,
+    Cob, Frame, FrameError, HEAD_HEARTBEAT_MS, HEAD_NODE, Mode, Moment, NodeId, PoseReport,
     SYNC_COUNTER_OVERFLOW, SYNC_PERIOD_US, VERTEBRAE,
 };
 use eel_units::{Duration, Instant};
@@ -14,7 +14,7 @@ use crate::node::{NodeStatus, Stage, Tracker, Wish, smooth_step};
 use crate::report::{Event, EventQueue};
 
 /// Frames that wait to be sent: two beats' worth.
-const WAITING: usize = 32;
+const WAITING: usize = 48;
 /// How long the gait waits for all vertebrae before it goes on with those that are there.
 const PATIENCE: Duration = Duration::from_millis(3_000);
 /// Longest time in which the gait fades out, in µs.
@@ -39,21 +39,56 @@ const OPERATIONAL: u8 = 5;
 /// How the head is set up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
-    /// How the eel moves.
-    pub gait: Gait,
+    /// What vertebrae are brought to do.
+    pub task: Task,
     /// Time between two SYNCs, 5–20 ms; [`Head::new`] takes the nearest of these.
     pub sync_period: Duration,
     /// Which vertebrae are expected, bit 0 the first.
     pub expected: u16,
+    /// Which vertebrae are led at all; the others are neither started nor told anything.
+    pub led: u16,
+}
+
+/// What vertebrae are brought to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// Swim: each follows its pose of a gait.
+    Swim(Gait),
+    /// Take this pose and keep it.
+    Pose(Pose),
+    /// Be in a mode in which the pose of a target means nothing: hold, moment, motor, damped or brake.
+    Mode(Mode),
+}
+
+impl Task {
+    /// Returns the mode that targets ask for.
+    const fn mode(&self) -> Mode {
+        match self {
+            Self::Swim(_) | Self::Pose(_) => Mode::Run,
+            Self::Mode(mode) => *mode,
+        }
+    }
 }
 
 impl Config {
-    /// Expects all ten vertebrae at the usual beat.
+    /// Lets all ten vertebrae swim at the usual beat.
     pub const fn new(gait: Gait) -> Self {
+        const ALL: u16 = (1 << VERTEBRAE) - 1;
         Self {
-            gait,
+            task: Task::Swim(gait),
             sync_period: Duration::from_micros(SYNC_PERIOD_US),
-            expected: (1 << VERTEBRAE) - 1,
+            expected: ALL,
+            led: ALL,
+        }
+    }
+
+    /// Brings only these vertebrae, bit 0 the first, to do something.
+    pub const fn only(led: u16, task: Task) -> Self {
+        Self {
+            task,
+            sync_period: Duration::from_micros(SYNC_PERIOD_US),
+            expected: led,
+            led,
         }
     }
 }
@@ -96,12 +131,13 @@ impl Head {
         config.sync_period = config.sync_period.clamp(shortest, longest);
         let mut ids = NodeId::all();
         let first = NodeId::FIRST;
+        let mode = config.task.mode();
         Self {
             config,
             phase: Phase::Starting,
             since: now,
             gait_start: None,
-            trackers: core::array::from_fn(|_| Tracker::new(ids.next().unwrap_or(first))),
+            trackers: core::array::from_fn(|_| Tracker::new(ids.next().unwrap_or(first), mode)),
             next_sync: now,
             next_heartbeat: now,
             sync_counter: 0,
@@ -118,7 +154,8 @@ impl Head {
         let Some(node) = cob.node().and_then(NodeId::new) else {
             return;
         };
-        let Some(tracker) = self.trackers.get_mut(node.index()) else {
+        let is_led = self.leads(node);
+        let Some(tracker) = self.trackers.get_mut(node.index()).filter(|_| is_led) else {
             return;
         };
         match (cob, frame.data()) {
@@ -175,11 +212,32 @@ impl Head {
         self.events.dropped()
     }
 
-    /// Lets the gait fade out, straightens the eel and switches it off.
+    /// Lets the gait fade out, straightens the eel and switches it off; where there is no gait, switches
+    /// off.
     pub fn stop(&mut self, now: Instant) {
         if matches!(self.phase, Phase::Starting | Phase::Swimming) {
-            self.enter(now, Phase::Straightening);
+            self.enter(now, self.stopping());
         }
+    }
+
+    /// Returns the phase with which a stop begins.
+    const fn stopping(&self) -> Phase {
+        match self.config.task {
+            Task::Swim(_) => Phase::Straightening,
+            Task::Pose(_) | Task::Mode(_) => Phase::SwitchingOff,
+        }
+    }
+
+    /// Sets what RPDO2 tells a vertebra with every target while it does its task; nothing at first. The
+    /// vertebra must have been told to listen to it.
+    pub fn set_moment(&mut self, id: NodeId, moment: Option<Moment>) {
+        if let Some(tracker) = self.trackers.get_mut(id.index()) {
+            tracker.moment = moment;
+        }
+    }
+
+    const fn leads(&self, id: NodeId) -> bool {
+        self.config.led & (1 << id.index()) != 0
     }
 
     /// Acknowledges the stops that are latched now. Whoever calls it knows that moving is safe.
@@ -199,7 +257,7 @@ impl Head {
         self.trackers.get(id.index()).map(Tracker::status)
     }
 
-    /// Returns how many vertebrae follow the gait.
+    /// Returns how many vertebrae do their task.
     pub fn running(&self) -> usize {
         self.trackers
             .iter()
@@ -218,7 +276,9 @@ impl Head {
         match self.phase {
             Phase::Starting if self.running() > 0 && (self.all_run() || elapsed >= PATIENCE) => {
                 self.gait_start = Some(now);
-                self.events.push(Event::GaitStarted);
+                if matches!(self.config.task, Task::Swim(_)) {
+                    self.events.push(Event::GaitStarted);
+                }
                 self.enter(now, Phase::Swimming);
             }
             Phase::Straightening
@@ -243,7 +303,14 @@ impl Head {
         if self.none_is_driven() {
             self.events.push(Event::Stopped);
         }
-        self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
+        if NodeId::all().all(|id| self.leads(id)) {
+            self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
+        } else {
+            let led = self.config.led;
+            for id in NodeId::all().filter(|id| led & (1 << id.index()) != 0) {
+                self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, id.get()]);
+            }
+        }
         self.enter(now, Phase::Stopped);
     }
 
@@ -302,14 +369,24 @@ impl Head {
             }
             let target = tracker.next_target(now, wish, pose);
             let id = tracker.id();
+            let is_running = tracker.status().stage == Stage::Running;
+            let moment = tracker.moment.filter(|_| is_running);
             if let Some(frame) = target.to_frame(id) {
                 self.queue(frame);
+            }
+            if let Some(moment) = moment {
+                self.send(Cob::Moment(id.get()), &moment.to_bytes());
             }
         }
     }
 
     /// Returns the gait's poses at `now`, scaled by the start and the stop.
     fn gait_poses(&self, now: Instant) -> [Pose; VERTEBRAE as usize] {
+        let gait = match self.config.task {
+            Task::Swim(gait) => gait,
+            Task::Pose(pose) => return [pose; VERTEBRAE as usize],
+            Task::Mode(_) => return [Pose::default(); VERTEBRAE as usize],
+        };
         let Some(start) = self.gait_start else {
             return [Pose::default(); VERTEBRAE as usize];
         };
@@ -323,14 +400,15 @@ impl Head {
             }
             _ => 0,
         };
-        self.config
-            .gait
-            .poses(now.to_micros().saturating_sub(start.to_micros()), scale)
+        gait.poses(now.to_micros().saturating_sub(start.to_micros()), scale)
     }
 
     /// Returns how long the gait takes to fade out in µs: one cycle, at most two seconds.
     fn fade(&self) -> u32 {
-        self.config.gait.period_us().min(LONGEST_FADE_US)
+        match self.config.task {
+            Task::Swim(gait) => gait.period_us().min(LONGEST_FADE_US),
+            Task::Pose(_) | Task::Mode(_) => 0,
+        }
     }
 
     fn send(&mut self, cob: Cob, data: &[u8]) {

@@ -14,6 +14,6 @@ mod node;
 mod report;
 
 pub use gait::{Gait, GaitError, Plane};
-pub use head::{Config, Head, Phase};
+pub use head::{Config, Head, Phase, Task};
 pub use node::{NodeStatus, Stage};
 pub use report::Event;

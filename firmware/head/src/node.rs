@@ -1,7 +1,7 @@
 //! One vertebra as the head sees it, and what it is told next.
 
 use eel_kinematics::Pose;
-use eel_protocol::{Counter, Mode, NodeId, PoseReport, State, Target};
+use eel_protocol::{Counter, Mode, Moment, NodeId, PoseReport, State, Target};
 use eel_units::{Angle, Duration, Instant};
 
 use crate::report::{Event, EventQueue};
@@ -69,6 +69,10 @@ pub(crate) enum Wish {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tracker {
     id: NodeId,
+    /// The mode of its task.
+    mode: Mode,
+    /// What RPDO2 tells it.
+    pub moment: Option<Moment>,
     status: NodeStatus,
     heard: Option<Instant>,
     commanded: Option<Instant>,
@@ -82,9 +86,11 @@ pub(crate) struct Tracker {
 }
 
 impl Tracker {
-    pub fn new(id: NodeId) -> Self {
+    pub fn new(id: NodeId, mode: Mode) -> Self {
         Self {
             id,
+            mode,
+            moment: None,
             status: NodeStatus {
                 stage: Stage::Missing,
                 state: State::NotReady,
@@ -185,12 +191,13 @@ impl Tracker {
                 self.enter(Stage::Latched);
                 events.push(Event::Latched(self.id, state));
             }
-            (Stage::Enabling, State::Run) => {
+            (Stage::Enabling, state) if state == state_of(self.mode) => {
                 self.enter(Stage::Running);
                 self.run_since = now;
                 events.push(Event::Running(self.id));
             }
-            (Stage::Running, State::Run) | (Stage::Enabling, State::Ready) => {}
+            (Stage::Running, state) if state == state_of(self.mode) => {}
+            (Stage::Enabling, State::Ready) => {}
             (Stage::Latched | Stage::Running | Stage::Enabling, _) => self.enter(Stage::Started),
             _ => {}
         }
@@ -229,12 +236,12 @@ impl Tracker {
                 self.reset_wanted = false;
                 (Mode::FaultReset, self.status.pose)
             }
-            (Stage::Running, Wish::Run | Wish::Keep) => (Mode::Run, self.blend(now, gait)),
+            (Stage::Running, Wish::Run | Wish::Keep) => (self.mode, self.blend(now, gait)),
             // Where it says it is, until it says that it runs: nothing jumps, whenever it begins.
-            (Stage::Enabling, Wish::Run) if self.runs < RUNS => (Mode::Run, self.hold()),
+            (Stage::Enabling, Wish::Run) if self.runs < RUNS => (self.mode, self.hold()),
             (Stage::Started, Wish::Run) if self.may_run() => {
                 self.enter(Stage::Enabling);
-                (Mode::Run, self.hold())
+                (self.mode, self.hold())
             }
             (stage, _) => {
                 if matches!(stage, Stage::Enabling | Stage::Running) {
@@ -280,6 +287,19 @@ impl Tracker {
             pitch: mix(from.pitch, gait.pitch),
             roll: mix(from.roll, gait.roll),
         }
+    }
+}
+
+/// Returns the state to which a mode leads.
+const fn state_of(mode: Mode) -> State {
+    match mode {
+        Mode::Run => State::Run,
+        Mode::Hold => State::Hold,
+        Mode::Moment => State::Moment,
+        Mode::Motor => State::Motor,
+        Mode::Damped => State::Damped,
+        Mode::Brake => State::Brake,
+        Mode::Off | Mode::FaultReset => State::Ready,
     }
 }
 

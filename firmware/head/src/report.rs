@@ -11,7 +11,7 @@ const EVENTS: usize = 64;
 pub enum Event {
     /// A node booted, or was found outside operation; it is started unless the head is stopping.
     Booted(NodeId),
-    /// A node follows the gait.
+    /// A node does its task.
     Running(NodeId),
     /// A node fell silent.
     Lost(NodeId),

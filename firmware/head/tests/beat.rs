@@ -180,7 +180,7 @@ fn frames_that_nobody_takes_are_dropped_and_counted() {
         head.tick(at(millis * 1_000));
     }
     let waiting = drain(&mut head).len() as u32;
-    assert_eq!(waiting, 32);
+    assert_eq!(waiting, 48);
     assert_eq!(head.dropped(), 100 + 10 - waiting);
     assert!(head.node(node_id(1)).is_some());
 }

@@ -45,6 +45,10 @@ nibble! {
         Hold = 3 "hold",
         /// Follow the target.
         Run = 4 "run",
+        /// Produce the moment of object 0x2001 and no other inside the workspace; the target is ignored.
+        Moment = 5 "moment",
+        /// Commissioning: each motor produces its torque of object 0x2002; the target is ignored.
+        Motor = 6 "motor",
         /// Acknowledge a latched stop; acts once, when the mode before was another.
         FaultReset = 15 "fault-reset",
     }
@@ -75,6 +79,10 @@ nibble! {
         StopOff = 9 "stop-off",
         /// A fault of this vertebra: off until a fault reset. Latched.
         Fault = 10 "fault",
+        /// Producing a moment.
+        Moment = 12 "moment",
+        /// Producing a torque of each motor, for commissioning.
+        Motor = 13 "motor",
     }
 }
 
@@ -85,6 +93,8 @@ impl State {
             self,
             Self::Run
                 | Self::Hold
+                | Self::Moment
+                | Self::Motor
                 | Self::Damped
                 | Self::Brake
                 | Self::StopDamped

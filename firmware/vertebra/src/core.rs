@@ -1,7 +1,7 @@
 //! The vertebra behind its node: estimation, states, control, protection.
 
 use eel_canopen::EventQueue;
-use eel_kinematics::{Joints, Policy, Pose, PoseError};
+use eel_kinematics::{Joints, Policy, Pose, PoseError, Side};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
@@ -51,6 +51,8 @@ pub(crate) struct Core {
     pub arrived: Option<u16>,
     pub feed_forward: FeedForward,
     pub received_feed: FeedForward,
+    /// What each motor is to produce in the mode for it.
+    pub motor_torque: [Torque; 3],
     pub status: Status,
     pub limited: Limited,
     pub warned: bool,
@@ -100,6 +102,7 @@ impl Core {
             arrived: None,
             feed_forward: FeedForward::NEUTRAL,
             received_feed: FeedForward::NEUTRAL,
+            motor_torque: [Torque::ZERO; 3],
             status: Status::NONE,
             limited: Limited::default(),
             warned: false,
@@ -267,8 +270,8 @@ impl Core {
         self.unallocated = [Torque::ZERO; 3];
         self.effort.limit = [LimitCode::Off; 3];
         let cap = match self.machine.state() {
-            State::Run | State::Hold => None,
-            State::Damped => Some(self.settings.limits.damped_torque),
+            State::Run | State::Hold | State::Moment => None,
+            State::Motor | State::Damped => Some(self.settings.limits.damped_torque),
             State::StopDamped => Some(self.stop_cap()),
             State::Brake | State::StopBrake => return [Drive::Brake; 3],
             State::Fault => return self.fault_drives(),
@@ -285,6 +288,8 @@ impl Core {
                 self.pull(motion, self.spline.reference(elapsed, period))
             }
             State::Hold => self.pull(motion, Reference::at_rest(self.hold)),
+            State::Moment => self.push(motion),
+            State::Motor => return self.drive_motors(motion, cap, sample),
             _ => self.impedance.damping(motion),
         };
         self.share(motion, moment, cap, sample)
@@ -309,15 +314,7 @@ impl Core {
         command_cap: Option<Torque>,
         sample: &Sample,
     ) -> [Drive; 3] {
-        let angles = self.angles();
-        let speeds = self.encoders.each_ref().map(Encoder::speed);
-        let situation = Situation {
-            sample,
-            angles,
-            speeds,
-            command_cap,
-        };
-        let bounds: [MotorBounds; 3] = bounds(&self.settings.limits, &self.electrical, &situation);
+        let bounds = self.bounds(command_cap, sample);
         let shared = motion.direct.jacobian.share(
             &moment,
             &bounds.each_ref().map(|motor| motor.torque),
@@ -325,24 +322,47 @@ impl Core {
         );
         self.achieved = shared.achieved;
         self.unallocated = shared.unallocated;
+        self.apply(&bounds, &shared.torque, &shared.bound, sample)
+    }
+
+    /// Returns what each motor may produce.
+    pub fn bounds(&self, command_cap: Option<Torque>, sample: &Sample) -> [MotorBounds; 3] {
+        let situation = Situation {
+            sample,
+            angles: self.angles(),
+            speeds: self.encoders.each_ref().map(Encoder::speed),
+            command_cap,
+        };
+        bounds(&self.settings.limits, &self.electrical, &situation)
+    }
+
+    /// Turns torques within their bounds into duties; `sides` tells which bound holds a motor.
+    pub fn apply(
+        &mut self,
+        bounds: &[MotorBounds; 3],
+        torques: &[Torque; 3],
+        sides: &[Option<Side>; 3],
+        sample: &Sample,
+    ) -> [Drive; 3] {
+        let speeds = self.encoders.each_ref().map(Encoder::speed);
         let mut limit = [LimitCode::None; 3];
         let mut drives = [Drive::Off; 3];
         let motors = drives
             .iter_mut()
             .zip(&mut limit)
             .zip(&mut self.currents)
-            .zip(&bounds);
+            .zip(bounds);
         for (motor, (((drive, limit), state), bounds)) in motors.enumerate() {
             let pick = |values: &[Torque; 3]| values.get(motor).copied().unwrap_or_default();
             let speed = speeds.get(motor).copied().unwrap_or_default();
             let measured = sample.current.get(motor).copied().unwrap_or_default();
-            *limit = bounds.reason(shared.bound.get(motor).copied().flatten());
+            *limit = bounds.reason(sides.get(motor).copied().flatten());
             let reading = Reading {
                 speed,
                 current: measured,
                 supply: sample.supply,
             };
-            let torque = pick(&shared.torque);
+            let torque = pick(torques);
             *drive = Drive::Duty(
                 self.electrical
                     .duty(state, torque, &bounds.torque, &reading),

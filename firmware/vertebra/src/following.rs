@@ -3,7 +3,7 @@
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
 use eel_protocol::{Condition, Mode, State};
-use eel_units::Instant;
+use eel_units::{Instant, Torque};
 
 use crate::command::{BRIDGED_PERIODS, Received};
 use crate::core::Core;
@@ -135,6 +135,7 @@ impl Core {
             self.currents.iter_mut().for_each(CurrentState::restart);
             self.lost_ticks = 0;
             self.forget_feed_forward();
+            self.motor_torque = [Torque::ZERO; 3];
             match after {
                 State::Run => self.spline = Spline::at_rest(self.pose),
                 State::Hold => self.hold = self.pose,

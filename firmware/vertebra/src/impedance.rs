@@ -1,6 +1,6 @@
 //! The moment that pulls the wrist to its reference: M = K e + D (ω_ref − ω) + M_ff.
 
-use eel_kinematics::{Direct, Rotation};
+use eel_kinematics::{Direct, Pose, Rotation};
 use eel_units::{Angle, AngularVelocity, Torque, saturate};
 
 use crate::settings::Gains;
@@ -70,6 +70,25 @@ impl Impedance {
             [s[0] + d[0] + f[0], s[1] + d[1] + f[1], s[2] + d[2] + f[2]],
             error,
         )
+    }
+
+    /// Returns the moment towards the pose `inside` and the angular velocity `slow`, at full stiffness.
+    pub fn restoring(
+        &self,
+        motion: &Motion,
+        inside: &Pose,
+        slow: [AngularVelocity; 3],
+    ) -> [Torque; 3] {
+        let error = motion
+            .direct
+            .rotation
+            .error_to(&Rotation::from_pose(inside));
+        // Q16 × Q29 is Q45; the torque is Q24.
+        let spring = product(self.stiffness, error.map(Angle::to_q29), |torque| {
+            torque >> 21
+        });
+        let [s, d] = [spring, self.damper(slow, motion.omega)];
+        [s[0] + d[0], s[1] + d[1], s[2] + d[2]]
     }
 
     /// Returns the moment that brings the motion to rest.

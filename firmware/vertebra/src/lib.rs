@@ -30,6 +30,7 @@ mod machine;
 mod objects;
 mod pending;
 mod protection;
+mod pushing;
 mod records;
 mod served;
 mod settings;

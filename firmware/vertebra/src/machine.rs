@@ -86,7 +86,7 @@ impl Machine {
     pub const fn is_enabled(&self) -> bool {
         matches!(
             self.state,
-            State::Run | State::Hold | State::Damped | State::Brake
+            State::Run | State::Hold | State::Moment | State::Motor | State::Damped | State::Brake
         )
     }
 
@@ -118,6 +118,8 @@ impl Machine {
             Mode::Damped => State::Damped,
             Mode::Hold => State::Hold,
             Mode::Run => State::Run,
+            Mode::Moment => State::Moment,
+            Mode::Motor => State::Motor,
         };
         if self.is_enabled() || (self.state == State::Ready && self.armed) {
             self.enter(now, wanted);

@@ -1,6 +1,7 @@
 //! The fields of the object dictionary that the core holds: reading and writing each.
 
 use eel_canopen::Abort;
+use eel_protocol::State;
 use eel_protocol::dictionary::Field;
 use eel_units::{Angle, Duration, Instant, Temperature, Torque};
 
@@ -83,6 +84,9 @@ impl Core {
             Field::MomentY => millis(self.received_feed.moment[1]),
             Field::MomentZ => millis(self.received_feed.moment[2]),
             Field::MomentStiffness => i64::from(self.received_feed.stiffness),
+            Field::MotorTorque1 => millis(self.motor_torque[0]),
+            Field::MotorTorque2 => millis(self.motor_torque[1]),
+            Field::MotorTorque3 => millis(self.motor_torque[2]),
             Field::PoseYaw => self.pose_word(0),
             Field::PosePitch => self.pose_word(2),
             Field::PoseRoll => self.pose_word(4),
@@ -169,7 +173,21 @@ impl Core {
             Field::MomentY => self.received_feed.moment[1] = torque(value),
             Field::MomentZ => self.received_feed.moment[2] = torque(value),
             Field::MomentStiffness => self.received_feed.stiffness = value as u16,
+            Field::MotorTorque1 => return self.set_motor_torque(0, value),
+            Field::MotorTorque2 => return self.set_motor_torque(1, value),
+            Field::MotorTorque3 => return self.set_motor_torque(2, value),
             _ => return self.set_setting(field, value),
+        }
+        Ok(())
+    }
+
+    /// Writes the torque of a single motor, which is refused unless the mode for it is on.
+    fn set_motor_torque(&mut self, motor: usize, value: i64) -> Result<(), Abort> {
+        if self.machine.state() != State::Motor {
+            return Err(Abort::DeviceState);
+        }
+        if let Some(wanted) = self.motor_torque.get_mut(motor) {
+            *wanted = torque(value);
         }
         Ok(())
     }

@@ -33,7 +33,7 @@ fn a_million_random_turns_break_no_promise() {
         .unwrap_or(2026_u64);
     println!("seed {seed} (set SEED for another)");
     let mut driven = 0;
-    let mut seen = [0_u64; 11];
+    let mut seen = [0_u64; 16];
     for run in 0..RUNS {
         let mood = if run % 2 == 0 {
             Mood::Disturbed
@@ -56,7 +56,8 @@ fn a_million_random_turns_break_no_promise() {
     }
     println!("driven in {driven} turns; turns in each state {seen:?}");
     assert!(driven > TURNS / 50, "the test drives too little: {driven}");
-    assert!(seen.iter().all(|turns| *turns > 0), "{seen:?}");
+    let was_in = |state: &State| seen[usize::from(state.code())] > 0;
+    assert!(State::ALL.iter().all(was_in), "{seen:?}");
 }
 
 /// Checks what must hold after any turn.
@@ -74,7 +75,12 @@ fn check(bench: &Bench, before: State) {
         }
         State::Brake | State::StopBrake => assert_eq!(drives, [Drive::Brake; 3]),
         State::Fault => assert!(!bench.is_driven(), "{drives:?}"),
-        State::Run | State::Hold | State::Damped | State::StopDamped => {
+        State::Run
+        | State::Hold
+        | State::Moment
+        | State::Motor
+        | State::Damped
+        | State::StopDamped => {
             assert!(!drives.contains(&Drive::Off), "{state:?}: {drives:?}");
         }
     }
@@ -107,7 +113,7 @@ fn is_legal(from: State, to: State) -> bool {
     let is_enabled = |state| {
         matches!(
             state,
-            State::Run | State::Hold | State::Damped | State::Brake
+            State::Run | State::Hold | State::Moment | State::Motor | State::Damped | State::Brake
         )
     };
     match (from, to) {
@@ -135,6 +141,8 @@ fn disturb(bench: &mut Bench, random: &mut Random, mood: Mood) {
         Mode::Run,
         Mode::Run,
         Mode::Hold,
+        Mode::Moment,
+        Mode::Motor,
         Mode::Damped,
         Mode::Brake,
     ];

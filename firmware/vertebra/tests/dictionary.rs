@@ -124,7 +124,7 @@ fn every_entry_is_read_with_its_length() {
         let beyond = read(&mut bench, object.index, object.highest() + 1);
         assert_eq!(beyond, Err(NO_SUBINDEX));
     }
-    assert_eq!(read(&mut bench, 0x2002, 1), Err(NO_OBJECT));
+    assert_eq!(read(&mut bench, 0x2003, 1), Err(NO_OBJECT));
 }
 
 #[test]

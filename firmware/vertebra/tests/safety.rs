@@ -101,7 +101,14 @@ fn bad_targets_before_enabling_do_not_bar_the_way() {
 
 #[test]
 fn a_silent_head_stops_300_ms_after_its_last_heartbeat() {
-    for mode in [Mode::Run, Mode::Hold, Mode::Damped, Mode::Brake] {
+    for mode in [
+        Mode::Run,
+        Mode::Hold,
+        Mode::Moment,
+        Mode::Motor,
+        Mode::Damped,
+        Mode::Brake,
+    ] {
         let mut bench = Bench::enabled(mode);
         let from = bench.millis;
         let last = bench.millis - bench.millis % 100;
@@ -198,7 +205,14 @@ fn an_nmt_stop_latches_a_ready_vertebra_and_leaves_a_stop_in_order() {
 
 #[test]
 fn reset_node_is_off_at_once_in_every_state() {
-    for mode in [Mode::Run, Mode::Hold, Mode::Damped, Mode::Brake] {
+    for mode in [
+        Mode::Run,
+        Mode::Hold,
+        Mode::Moment,
+        Mode::Motor,
+        Mode::Damped,
+        Mode::Brake,
+    ] {
         let mut bench = Bench::enabled(mode);
         bench.nmt(NmtCommand::ResetNode);
         bench.tick();
@@ -210,11 +224,13 @@ fn reset_node_is_off_at_once_in_every_state() {
 #[test]
 fn the_emergency_stop_line_frees_all_bridges_in_the_same_tick_in_every_state() {
     type Prepare = fn() -> Bench;
-    let states: [(Prepare, State); 10] = [
+    let states: [(Prepare, State); 12] = [
         (Bench::new, State::NotReady),
         (Bench::ready, State::Ready),
         (Bench::running, State::Run),
         (|| Bench::enabled(Mode::Hold), State::Hold),
+        (|| Bench::enabled(Mode::Moment), State::Moment),
+        (|| Bench::enabled(Mode::Motor), State::Motor),
         (|| Bench::enabled(Mode::Damped), State::Damped),
         (|| Bench::enabled(Mode::Brake), State::Brake),
         (|| stopping(State::StopDamped), State::StopDamped),

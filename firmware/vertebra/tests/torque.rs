@@ -2,11 +2,11 @@
 //! code tells which bound acted.
 
 use eel_kinematics::{Joints, Wrist};
-use eel_protocol::{Effort, LimitCode, Mode, State};
+use eel_protocol::{LimitCode, Mode, State};
 use eel_units::{Current, Temperature, Voltage};
 use eel_vertebra::{Drive, Limits, Motor};
 
-use support::{Bench, NODE, Random, duty, pose, radians};
+use support::{Bench, Random, duty, limits, pose, radians};
 
 mod support;
 
@@ -50,18 +50,6 @@ impl Windings {
 fn angles(bench: &Bench) -> [f64; 3] {
     let Joints(angles) = Wrist::PAPER.inverse(&bench.pose).unwrap().joints;
     angles.map(radians)
-}
-
-/// Returns the limit codes of the last effort report.
-fn limits(bench: &Bench) -> [LimitCode; 3] {
-    let id = 0x280 + u16::from(NODE);
-    let mut reports = bench.sent.iter().rev();
-    let report = reports
-        .find(|sent| sent.frame.cob_id() == Some(id))
-        .unwrap();
-    Effort::from_bytes(report.frame.data().try_into().unwrap())
-        .unwrap()
-        .limit
 }
 
 /// Returns a wrist that stands 0.2 rad of yaw from where it is asked to be.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
-use crate::active::{Faults, Head, Lss, Nmt, Nodes, Read, Scope, Store, Write};
+use crate::active::{Drive, Faults, Head, Lss, Nmt, Nodes, Read, Scope, Store, Write};
 use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
 use crate::source::Limits;
@@ -33,6 +33,7 @@ Examples:
   eel write 3 gains.peak_torque=2.5           in N.m, range-checked
   eel faults 3                                what stopped vertebra 3, and how it was
   eel scope 3 pose.yaw motor.angle1           every millisecond for half a second, plotted
+  eel drive 3 pose --yaw 10 --degrees         vertebra 3 by hand
   eel head vcan0 --gait swim --seconds 20     lead simulated vertebrae through a gait
   eel wrist ik --yaw 20 --degrees             motor angles for a pose; eel wrist --help says more";
 
@@ -67,6 +68,7 @@ pub enum Command {
     Nmt(Nmt),
     Lss(Lss),
     Store(Store),
+    Drive(Drive),
     Head(Head),
 }
 
@@ -79,7 +81,7 @@ const GROUPS: [(&str, &[&str]); 3] = [
     (
         "Ask and command nodes (these send)",
         &[
-            "nodes", "read", "write", "faults", "scope", "nmt", "lss", "store", "head",
+            "nodes", "read", "write", "faults", "scope", "nmt", "lss", "store", "drive", "head",
         ],
     ),
     ("Without a bus", &["export", "wrist"]),

@@ -61,6 +61,7 @@ fn main() -> ExitCode {
         Command::Read(read) => read.run(),
         Command::Faults(faults) => faults.run(),
         Command::Scope(scope) => scope.run(),
+        Command::Drive(drive) => drive.run(),
         Command::Write(write) => write.run(),
         Command::Nmt(nmt) => nmt.run(),
         Command::Lss(lss) => lss.run(),

@@ -134,12 +134,12 @@ impl Object {
         }
     }
 
-    /// Tells whether writing it can move a robot: targets, moments, what an RPDO carries, and what
+    /// Tells whether writing it can move a robot: targets, moments, torques, what an RPDO carries, and what
     /// nobody knows.
     pub const fn moves(&self) -> bool {
         let is_known = !matches!(self.kind, Kind::Unknown);
         match self.place.index {
-            0x2000 | 0x2001 | 0x1400..=0x17FF => true,
+            0x2000..=0x2002 | 0x1400..=0x17FF => true,
             0x2000.. => !is_known,
             _ => false,
         }
@@ -275,7 +275,12 @@ mod tests {
             error.0,
             "there is no object \"pose.jaw\"; pose has yaw, pitch, roll, code, crc, status"
         );
-        assert!(find("poze").unwrap_err().0.contains("moment, motor, pose"));
+        assert!(
+            find("poze")
+                .unwrap_err()
+                .0
+                .contains("moment, motor, motor_torque, pose")
+        );
         assert!(find("0x1G").is_err() && find("0x1018:256").is_err());
     }
 

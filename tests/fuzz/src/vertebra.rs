@@ -172,7 +172,12 @@ impl Bench {
                 assert!(duty.to_q15().abs() <= FULL, "{duty:?}");
             }
             let may_drive = match state {
-                State::Run | State::Hold | State::Damped | State::StopDamped => true,
+                State::Run
+                | State::Hold
+                | State::Moment
+                | State::Motor
+                | State::Damped
+                | State::StopDamped => true,
                 State::Brake | State::StopBrake | State::Fault => !matches!(drive, Drive::Duty(_)),
                 _ => drive == Drive::Off,
             };

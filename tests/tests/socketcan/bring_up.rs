@@ -11,14 +11,14 @@ use crate::nodes::Nodes;
 use crate::support::interface;
 
 /// Returns the program beside this test.
-fn program() -> String {
+pub fn program() -> String {
     let test = env::current_exe().expect("a path");
     let folder = test.ancestors().nth(2).expect("target/debug");
     folder.join("eel").display().to_string()
 }
 
 /// Runs `eel` on the interface and returns its exit code and output.
-fn eel(interface: &str, arguments: &[&str]) -> (i32, String, String) {
+pub fn eel(interface: &str, arguments: &[&str]) -> (i32, String, String) {
     let output = Command::new(program())
         .args(arguments)
         .env("EEL_BUS", interface)
@@ -30,14 +30,14 @@ fn eel(interface: &str, arguments: &[&str]) -> (i32, String, String) {
     (code, text(&output.stdout), text(&output.stderr))
 }
 
-fn json(interface: &str, arguments: &[&str]) -> Value {
+pub fn json(interface: &str, arguments: &[&str]) -> Value {
     let (code, out, err) = eel(interface, arguments);
     assert_eq!(code, 0, "{arguments:?}: {err}");
     serde_json::from_str(&out).unwrap_or_else(|error| panic!("{error}: {out}"))
 }
 
 /// Starts vertebrae 3 and 5 and waits until both answer.
-fn start(interface: &str) -> Nodes {
+pub fn start(interface: &str) -> Nodes {
     let chosen = [3, 5].map(|id| NodeId::new(id).expect("a vertebra"));
     let nodes = Nodes::start(interface, chosen.to_vec());
     let has_both = || {

@@ -137,18 +137,24 @@ impl Fake {
                 self.armed = false;
             }
             _ if self.state.is_latched() => {}
-            Mode::Run if self.state == State::Run || (self.armed && self.ready()) => {
-                self.state = State::Run;
-                self.pose = Pose { yaw, pitch, roll };
-            }
-            Mode::Run => self.armed = false,
             Mode::Off => {
                 self.armed = true;
-                if self.state == State::Run {
+                if self.state.is_driven() {
                     self.state = State::Ready;
                 }
             }
-            _ => {}
+            Mode::FaultReset => {}
+            mode if self.state.is_driven() || (self.armed && self.ready()) => {
+                self.state = match mode {
+                    Mode::Hold => State::Hold,
+                    Mode::Moment => State::Moment,
+                    _ => State::Run,
+                };
+                if mode == Mode::Run {
+                    self.pose = Pose { yaw, pitch, roll };
+                }
+            }
+            _ => self.armed = false,
         }
     }
 

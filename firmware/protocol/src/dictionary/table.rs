@@ -248,6 +248,12 @@ records! {
         4 MomentStiffness "stiffness" STIFFNESS_SCALE,
             "Scale of the configured stiffness: 1 at power-up, 2 at most.";
     }
+    MOTOR_TORQUE = 0x2002 "motor_torque",
+        "Torques of single motors for commissioning, in mode motor only; 0 whenever the mode begins." {
+        1 MotorTorque1 "motor1" torque(RW, RX), "Torque that motor 1 shall produce.";
+        2 MotorTorque2 "motor2" torque(RW, RX), "Torque that motor 2 shall produce.";
+        3 MotorTorque3 "motor3" torque(RW, RX), "Torque that motor 3 shall produce.";
+    }
     POSE = 0x2010 "pose", "What the vertebra does; TPDO1." {
         1 PoseYaw "yaw" angle(RO, TX), "Measured angle about x, swimming.";
         2 PosePitch "pitch" angle(RO, TX), "Measured angle about y, diving.";
@@ -376,17 +382,18 @@ pub(super) const fn position(index: u16) -> Option<usize> {
     Some(match index {
         0x2000 => 0,
         0x2001 => 1,
-        0x2010 => 2,
-        0x2011 => 3,
-        0x2012 => 4,
-        0x2013 => 5,
-        0x2020 => 6,
-        0x2021 => 7,
-        0x2030 => 8,
-        0x2040 => 9,
-        0x2050 => 10,
-        0x2100 => 11,
-        0x2101 => 12,
+        0x2002 => 2,
+        0x2010 => 3,
+        0x2011 => 4,
+        0x2012 => 5,
+        0x2013 => 6,
+        0x2020 => 7,
+        0x2021 => 8,
+        0x2030 => 9,
+        0x2040 => 10,
+        0x2050 => 11,
+        0x2100 => 12,
+        0x2101 => 13,
         _ => return None,
     })
 }

@@ -6,7 +6,9 @@ pub mod sdo;
 use eel_canopen::{Frame, NmtCommand};
 use eel_kinematics::{Joints, Pose, Wrist};
 use eel_protocol::emergency::EmergencyReport;
-use eel_protocol::{Condition, Counter, HEAD_NODE, Mode, NodeId, PoseReport, State, Target};
+use eel_protocol::{
+    Condition, Counter, Effort, HEAD_NODE, LimitCode, Mode, NodeId, PoseReport, State, Target,
+};
 use eel_units::{Angle, Current, Duty, Instant, Temperature, Voltage};
 use eel_vertebra::store::{self, RamFlash, Store};
 use eel_vertebra::{Drive, Sample, Settings, Vertebra, turn};
@@ -345,6 +347,8 @@ pub fn stays_off(bench: &mut Bench) {
     for mode in [
         Mode::Run,
         Mode::Hold,
+        Mode::Moment,
+        Mode::Motor,
         Mode::Damped,
         Mode::Brake,
         Mode::Off,
@@ -400,6 +404,18 @@ pub fn healthy() -> Sample {
         emergency_stop: false,
         chain_in: false,
     }
+}
+
+/// Returns the limit codes of the last effort report.
+pub fn limits(bench: &Bench) -> [LimitCode; 3] {
+    let id = 0x280 + u16::from(NODE);
+    let mut reports = bench.sent.iter().rev();
+    let report = reports
+        .find(|sent| sent.frame.cob_id() == Some(id))
+        .unwrap();
+    Effort::from_bytes(report.frame.data().try_into().unwrap())
+        .unwrap()
+        .limit
 }
 
 /// Returns the duty of a drive, if it is one.

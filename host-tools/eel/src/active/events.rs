@@ -50,7 +50,7 @@ pub fn is_trouble(event: &Event) -> bool {
 pub fn words(event: &Event, acknowledged: bool) -> (Option<u8>, String) {
     let (node, text) = match event {
         Event::Booted(node) => (node, "on the bus".to_owned()),
-        Event::Running(node) => (node, "follows the gait".to_owned()),
+        Event::Running(node) => (node, "runs".to_owned()),
         Event::Lost(node) => (node, "fell silent: check its supply and cable".to_owned()),
         Event::Latched(node, state) if acknowledged => (
             node,

@@ -98,7 +98,7 @@ enum PlaneName {
     Vertical,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let time = text
         .parse()
         .ok()
@@ -107,7 +107,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Reads `3,5` or `1-4` as one bit for each vertebra, bit 0 the first.
-fn expected(text: &str) -> Result<u16, String> {
+pub(super) fn expected(text: &str) -> Result<u16, String> {
     let wrong = || format!("{text:?} are no vertebrae: write 3,5 or 1-4, each 1 to 10");
     let mut all = 0;
     for part in text.split(',') {
@@ -213,7 +213,7 @@ impl Head {
 }
 
 /// Makes sure that no other head is on the bus.
-fn alone(bus: AnyBus, name: &str) -> Result<AnyBus> {
+pub(super) fn alone(bus: AnyBus, name: &str) -> Result<AnyBus> {
     let mut client = Client::new(bus);
     client.listen(OTHER)?;
     if client.heard(HEAD_NODE).is_some() {

@@ -5,10 +5,11 @@ use std::io::{IsTerminal, Write, stderr, stdout};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow};
-use eel_client::NmtCommand;
+use eel_client::{NmtCommand, abort};
 use eel_head::{Config, Event, Head, Phase};
-use eel_protocol::{Cob, Frame, NodeId};
+use eel_protocol::{Cob, Frame, Moment, NodeId};
 use eel_transport::{Bus, BusError, Received};
+use serde_json::json;
 
 use super::bus::AnyBus;
 use super::events::{Who, is_trouble, json_of, words};
@@ -45,6 +46,8 @@ pub struct Live {
     mute: Option<std::io::Error>,
     /// Whether stops that were latched before the head came are acknowledged.
     pub resets_first: bool,
+    /// What a vertebra is sent when it begins its task.
+    pub greetings: Vec<(NodeId, Frame)>,
     has_reset: u16,
 }
 
@@ -103,6 +106,7 @@ impl Live {
             sync_period: Duration::from_micros(u64::from(config.sync_period.to_micros())),
             mute: None,
             resets_first: false,
+            greetings: Vec::new(),
             has_reset: 0,
         }
     }
@@ -126,6 +130,16 @@ impl Live {
         }
         self.outcome.elapsed = self.start.elapsed();
         Ok(self.outcome)
+    }
+
+    /// Sets what RPDO2 tells a vertebra with every target.
+    pub fn set_moment(&mut self, id: NodeId, moment: Option<Moment>) {
+        self.head.set_moment(id, moment);
+    }
+
+    /// Gives the bus back.
+    pub fn into_bus(self) -> AnyBus {
+        self.bus
     }
 
     fn lead(&mut self, limit: Option<Duration>) -> Result<()> {
@@ -177,9 +191,38 @@ impl Live {
                 let elapsed = self.start.elapsed().as_micros() as u64;
                 let now = eel_units::Instant::from_micros(elapsed);
                 self.head.handle_frame(now, frame);
+                let frame = *frame;
+                self.hear_refusal(&frame);
             }
         }
         Ok(())
+    }
+
+    /// Tells where a vertebra refuses what it was sent when it began its task.
+    fn hear_refusal(&mut self, frame: &Frame) {
+        let Some(Cob::SdoResponse(node)) = frame.cob_id().map(Cob::from_id) else {
+            return;
+        };
+        let was_sent = self.greetings.iter().any(|(to, _)| to.get() == node);
+        if let [0x80, _, _, _, code @ ..] = frame.data()
+            && let Ok(code) = code.try_into()
+            && was_sent
+        {
+            let code = abort(u32::from_le_bytes(code));
+            self.outcome.troubles += 1;
+            let elapsed = self.start.elapsed().as_secs_f64();
+            if self.is_json {
+                let all = json!({
+                    "time_s": elapsed, "event": "refused", "node": node, "code": code.code
+                });
+                self.tell(format_args!("{all}"));
+            } else {
+                self.tell(format_args!(
+                    "{elapsed:9.3}  vertebra {node:<7}  refuses: {}: {}",
+                    code.meaning, code.cure
+                ));
+            }
+        }
     }
 
     /// Sends what waits; what the bus does not take waits on.
@@ -246,6 +289,10 @@ impl Live {
         let mut lines: Vec<(String, Vec<u8>)> = Vec::new();
         while let Some(event) = self.head.poll_event() {
             let acknowledged = self.acknowledge(&event, elapsed);
+            if let Event::Running(node) = &event {
+                let greetings = self.greetings.iter().filter(|(to, _)| to == node);
+                self.waiting.extend(greetings.map(|(_, frame)| *frame));
+            }
             self.outcome.troubles += u64::from(is_trouble(&event) && !acknowledged);
             if self.is_json {
                 self.tell(format_args!("{}", json_of(&event, elapsed)));

@@ -1,6 +1,7 @@
 //! The commands that send: bring-up of nodes, their faults and signals, and the head.
 
 mod bus;
+mod drive;
 mod events;
 mod faults;
 mod head;
@@ -21,6 +22,7 @@ use eel_protocol::{HEAD_NODE, VERTEBRAE};
 
 use crate::usage::Usage;
 
+pub use drive::Drive;
 pub use faults::Faults;
 pub use head::Head;
 pub use lss::Lss;

@@ -20,8 +20,8 @@ Names are those of `eel export md`. A number is given in the object's unit, with
 Every value is held against the object's range before anything is sent; they are then written in the
 order given, until one is refused. What is written lasts until the node is reset: `eel store`.
 
---yes is needed, except on a virtual interface, for what can move a robot: target, moment, RPDOs, and
-objects that nobody knows.
+--yes is needed, except on a virtual interface, for what can move a robot: target, moment, motor_torque,
+RPDOs, and objects that nobody knows.
 
 --json: one object: node (number), written (array of objects as those of `eel read --json`;
 where one is refused, those before it).
