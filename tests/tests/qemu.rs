@@ -273,7 +273,9 @@ fn check_that_much_happened(outputs: &[Output]) {
             .filter(|output| output.actions.drives.iter().any(wanted))
             .count()
     };
-    let driven = count(|drive| matches!(drive, Drive::Duty(duty) if duty.to_q15() != 0));
+    let driven = count(
+        |drive| matches!(drive, Drive::Current(setpoint) if setpoint.current.to_microamps() != 0),
+    );
     let braked = count(|drive| matches!(drive, Drive::Brake));
     let free = count(|drive| matches!(drive, Drive::Off));
     let frames = || outputs.iter().flat_map(|output| &output.frames);

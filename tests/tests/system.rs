@@ -4,6 +4,8 @@
 mod client;
 #[path = "system/faults.rs"]
 mod faults;
+#[path = "system/friction.rs"]
+mod friction;
 #[path = "system/swim.rs"]
 mod swim;
 #[path = "system/watch.rs"]

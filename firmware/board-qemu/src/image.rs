@@ -92,7 +92,7 @@ fn run() -> Result<(), Failure> {
 /// Tells whether a turn ends with a motor driven.
 fn is_driven(actions: &Actions) -> bool {
     let mut drives = actions.drives.iter();
-    drives.any(|drive| matches!(drive, Drive::Duty(_)))
+    drives.any(|drive| matches!(drive, Drive::Current(_)))
 }
 
 /// Does one turn, whose frames are appended.

@@ -5,7 +5,8 @@ use core::hint::black_box;
 
 use cortex_m_semihosting::{debug, hio};
 use eel_kinematics::{Direct, Inverse, Policy, Reach, Shared, Wrist};
-use eel_units::{Torque, arctangents, ratio_q30, root_near, sin_cos_near};
+use eel_units::{Current, Torque, Voltage, arctangents, ratio_q30, root_near, sin_cos_near};
+use eel_vertebra::{CurrentLoop, Drive, Motor, Setpoint};
 use libm::{atanf, sqrtf};
 
 use crate::case::{self, Case, Floats};
@@ -21,7 +22,7 @@ const SEED: u64 = 0x0EE1_0000_0003;
 /// How often each call is repeated: a tick is six instructions.
 const REPEATS: u32 = 32;
 /// What the names of the columns are; the first is the loop alone.
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 15] = [
     "loop",
     "sine_cosine",
     "arctangent",
@@ -36,6 +37,7 @@ const NAMES: [&str; 14] = [
     "step_free",
     "step_saturated",
     "nearest",
+    "current_loop",
 ];
 /// What the names of the columns in single precision are.
 const FLOAT_NAMES: [&str; 9] = [
@@ -134,7 +136,29 @@ fn measure(stopwatch: &Stopwatch, case: &Case) -> [u32; NAMES.len()] {
         repeat(stopwatch, || {
             black_box(wrist).nearest(black_box(&case.beyond), black_box(&NEAREST))
         }),
+        repeat_current_loop(stopwatch, case),
     ]
+}
+
+/// Counts a turn of the current loop, three motors driven, repeated.
+fn repeat_current_loop(stopwatch: &Stopwatch, case: &Case) -> u32 {
+    let electrical = [0, 1, 2].map(|motor| {
+        // As much current as torque in mN·m, twice in mA.
+        let milli = case
+            .moment
+            .get(motor)
+            .map_or(0, |torque| torque.to_q24() >> 14);
+        Current::from_milliamps(milli)
+    });
+    let mut current_loop = CurrentLoop::new(&Motor::PROTOTYPE);
+    let drives = electrical.map(|current| {
+        Drive::Current(Setpoint {
+            current,
+            emf: Voltage::from_millivolts(3_000),
+        })
+    });
+    current_loop.set(&drives, Voltage::from_millivolts(24_000));
+    repeat(stopwatch, || current_loop.update(black_box(electrical)))
 }
 
 /// Where the nearest pose is looked for: all that the kernel reaches.
@@ -199,7 +223,7 @@ fn measure_floats(stopwatch: &Stopwatch, floats: &Floats) -> [u32; FLOAT_NAMES.l
 
 /// Counts a call, repeated. The result stays where it is made.
 #[inline(never)]
-fn repeat<Answer>(stopwatch: &Stopwatch, call: impl Fn() -> Answer) -> u32 {
+fn repeat<Answer>(stopwatch: &Stopwatch, mut call: impl FnMut() -> Answer) -> u32 {
     let ((), ticks) = stopwatch.time(|| {
         let mut left = REPEATS;
         while left != 0 {

@@ -3,8 +3,9 @@
 //! What has forced the PWM low, be it the line or [`force_off`], stays until the vertebra has been told
 //! and has kept the bridges from driving for two ticks: by then no old duty is left in the timer.
 
-use eel_drivers::{Bridge, BridgeError, Orientation, Output};
-use eel_vertebra::Drive;
+use eel_drivers::{Bridge, BridgeError, Orientation};
+use eel_units::Voltage;
+use eel_vertebra::{CurrentLoop, Drive, Motor};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, Flex, Input, Level, Output as Pin, OutputType, Pull, Speed};
 use embassy_stm32::pac;
@@ -12,8 +13,10 @@ use embassy_stm32::pac::timer::vals::{Bkp, Mms2, Ossi, Ossr};
 use embassy_stm32::peripherals::*;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
-use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm, SimplePwmChannel};
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use embassy_stm32::timer::{BkIn1, BreakInputPin};
+
+use crate::power;
 
 const PWM_FREQUENCY: Hertz = Hertz::khz(20);
 
@@ -33,12 +36,8 @@ pub struct Connections {
     pub stop: Peri<'static, PB12>,
 }
 
-type Motor = Bridge<SimplePwmChannel<'static, TIM1>, Pin<'static>, Pin<'static>>;
-
 /// The bridges of the three motors, and the lines that report on them.
 pub struct Bridges {
-    motors: [Motor; 3],
-    orientations: [Orientation; 3],
     faults: [Input<'static>; 3],
     stop: Flex<'static>,
     /// Whether the vertebra was told of a stop in this tick.
@@ -55,6 +54,7 @@ impl Bridges {
     pub fn new(
         connections: Connections,
         orientations: [Orientation; 3],
+        motor: &Motor,
     ) -> Result<Self, BridgeError> {
         let Connections {
             timer,
@@ -80,18 +80,18 @@ impl Bridges {
             channel.enable();
             channel
         });
+        let motors = [
+            Bridge::new(one, low(direction.0), low(wake.0))?,
+            Bridge::new(two, low(direction.1), low(wake.1))?,
+            Bridge::new(three, low(direction.2), low(wake.2))?,
+        ];
+        power::start(motors, orientations, CurrentLoop::new(motor));
         Ok(Self {
-            motors: [
-                Bridge::new(one, low(direction.0), low(wake.0))?,
-                Bridge::new(two, low(direction.1), low(wake.1))?,
-                Bridge::new(three, low(direction.2), low(wake.2))?,
-            ],
             faults: [
                 Input::new(fault.0, Pull::Up),
                 Input::new(fault.1, Pull::Up),
                 Input::new(fault.2, Pull::Up),
             ],
-            orientations,
             stop,
             is_stop_told: false,
             was_idle: false,
@@ -99,19 +99,11 @@ impl Bridges {
     }
 
     /// Makes the bridges do this until the next tick.
-    pub fn apply(&mut self, drives: [Drive; 3]) {
-        let built = self.motors.iter_mut().zip(self.orientations);
-        for ((motor, orientation), drive) in built.zip(drives) {
-            let output = match drive {
-                Drive::Off => Output::Off,
-                Drive::Brake => Output::Brake,
-                Drive::Duty(duty) => Output::Duty(duty),
-            };
-            if motor.apply(orientation.output(output)).is_err() {
-                force_off();
-            }
-        }
-        let is_idle = !drives.iter().any(|drive| matches!(drive, Drive::Duty(_)));
+    pub fn apply(&mut self, drives: [Drive; 3], supply: Voltage) {
+        power::set(&drives, supply);
+        let is_idle = !drives
+            .iter()
+            .any(|drive| matches!(drive, Drive::Current(_)));
         if is_idle && self.was_idle {
             self.restore_outputs();
         }

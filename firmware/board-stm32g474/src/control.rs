@@ -11,13 +11,13 @@ use embassy_stm32::can::Properties;
 use embassy_time::{Duration, Instant, Ticker};
 
 use crate::bridges::{self, Bridges};
-use crate::currents::Currents;
+use crate::currents::{self, Currents};
 use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
 use crate::{bus, liveness, storage};
 
 /// How the motors and their encoders are built in. The one table of signs: [`measure`] turns what
-/// comes from the sensors by it, [`Bridges::apply`] what goes to the bridges.
+/// comes from the sensors by it, the current loop in `power.rs` what goes to the bridges.
 const ORIENTATIONS: [Orientation; 3] = [Orientation::DIRECT; 3];
 
 /// Everything that the tick measures with and acts on.
@@ -25,7 +25,7 @@ pub struct Hardware {
     /// The bridges.
     pub bridges: bridges::Connections,
     /// Current and supply measurement.
-    pub currents: crate::currents::Connections,
+    pub currents: currents::Connections,
     /// Motor encoders.
     pub counters: crate::sensors::CounterConnections,
     /// Crank encoders.
@@ -49,7 +49,7 @@ pub struct Birth {
 pub async fn run(hardware: Hardware, birth: Birth) {
     let (crank_bus, select) = hardware.cranks.start();
     let cranks = Cranks::new(&crank_bus, select);
-    let bridges = Bridges::new(hardware.bridges, ORIENTATIONS);
+    let bridges = Bridges::new(hardware.bridges, ORIENTATIONS, &birth.settings.motor);
     let (Some(mut cranks), Ok(mut bridges)) = (cranks, bridges) else {
         // Can't happen with these pins; the watchdog starts anew.
         bridges::force_off();
@@ -87,7 +87,7 @@ pub async fn run(hardware: Hardware, birth: Birth) {
             bus::room(),
             bus::send,
         );
-        bridges.apply(actions.drives);
+        bridges.apply(actions.drives, sample.supply);
         // Before anybody can answer what the turn sends: a boot-up under a new node id, say.
         let identifiers = vertebra.identifiers();
         if identifiers != heard {
@@ -100,6 +100,8 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         vertebra.note_overruns(received, transmitted);
         let micros = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
         vertebra.note_loop_time(Span::from_micros(micros));
+        let (last, longest) = currents::turn_ns();
+        vertebra.note_current_loop(last, longest);
         liveness::CONTROL.advance();
     }
 }

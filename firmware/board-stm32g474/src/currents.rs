@@ -1,7 +1,10 @@
-//! Motor currents and supply: four conversions per PWM period, summed until the control tick.
+//! Motor currents and supply: four conversions per PWM period, for the current loop, and summed until
+//! the control tick.
 
 use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
 
+use cortex_m::peripheral::DWT;
 use critical_section::Mutex;
 use eel_units::{Current, Voltage};
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, InjectedAdc, SampleTime};
@@ -12,7 +15,7 @@ use embassy_stm32::peripherals::*;
 use embassy_stm32::triggers::TIM1_TRGO2;
 use embassy_stm32::{Peri, interrupt as handler};
 
-use crate::{bridges, liveness};
+use crate::{bridges, liveness, power};
 
 /// nA per step of the ADC: 3.3 V / 4096 over 5 mΩ · 50. The range is ±6.6 A: beyond 4.1 A, which the
 /// supply drives through a stalled motor, and 3.75 A, at which the vertebra sees an over-current.
@@ -42,6 +45,12 @@ impl Sums {
         count: 0,
     };
 }
+
+/// Clocks of the last and of the longest turn of the interrupt.
+static TURN: AtomicU32 = AtomicU32::new(0);
+static LONGEST_TURN: AtomicU32 = AtomicU32::new(0);
+/// Clocks in a microsecond.
+const CLOCK_MHZ: u32 = 170;
 
 static SUMS: Mutex<Cell<Sums>> = Mutex::new(Cell::new(Sums::NONE));
 
@@ -106,6 +115,16 @@ impl Currents {
         self.ticks >= OFFSET_TICKS
     }
 
+    /// Tells the current loop the offsets.
+    fn hand_over_offsets(&self) {
+        let count = u64::from(self.offsets.count.max(1));
+        let [one, two, three, _] = self.offsets.readings;
+        power::set_offsets([one, two, three].map(|sum| {
+            let sixteenths = u64::from(sum) * u64::from(power::FRACTIONS) / count;
+            sixteenths as u32
+        }));
+    }
+
     /// Returns the means since the last call. The first 256 calls average the offsets instead: the
     /// bridges must be off, and every channel counts as faulty.
     pub fn take(&mut self) -> Measurement {
@@ -122,6 +141,9 @@ impl Currents {
             }
             self.offsets.count += sums.count;
             self.ticks += 1;
+            if self.has_offsets() {
+                self.hand_over_offsets();
+            }
             return measurement;
         }
         for motor in 0..3 {
@@ -153,18 +175,34 @@ fn ADC1_2() {
     }
     // Cleared by writing 1, and only this one.
     pac::ADC1.isr().write(|flags| flags.set_jeos(true));
-    critical_section::with(|section| {
+    let start = DWT::cycle_count();
+    let readings = [0, 1, 2, 3].map(|rank| pac::ADC1.jdr(rank).read().jdata());
+    let is_stalled = critical_section::with(|section| {
         let cell = SUMS.borrow(section);
         let mut sums = cell.get();
-        for (rank, sum) in sums.readings.iter_mut().enumerate() {
-            *sum = sum.wrapping_add(u32::from(pac::ADC1.jdr(rank).read().jdata()));
+        for (sum, reading) in sums.readings.iter_mut().zip(readings) {
+            *sum = sum.wrapping_add(u32::from(reading));
         }
         sums.count = sums.count.wrapping_add(1);
         cell.set(sums);
-        // Nobody controls the currents any more; the watchdog needs ten times as long.
-        if sums.count == STALLED {
-            bridges::force_off();
-        }
+        sums.count >= STALLED
     });
+    if is_stalled {
+        // Nobody controls the currents any more; the watchdog needs ten times as long.
+        power::stop();
+        bridges::force_off();
+    } else {
+        let [one, two, three, _] = readings;
+        power::convert([one, two, three]);
+    }
     liveness::CURRENT.advance();
+    let cycles = DWT::cycle_count().wrapping_sub(start);
+    TURN.store(cycles, Ordering::Relaxed);
+    LONGEST_TURN.fetch_max(cycles, Ordering::Relaxed);
+}
+
+/// Returns the time that the last and the longest turn of the interrupt took, in ns.
+pub fn turn_ns() -> (u32, u32) {
+    let ns = |cycles: &AtomicU32| cycles.load(Ordering::Relaxed).saturating_mul(1_000) / CLOCK_MHZ;
+    (ns(&TURN), ns(&LONGEST_TURN))
 }

@@ -45,6 +45,11 @@ fn main() -> ! {
     let cause = failure::take_start();
     let peripherals = embassy_stm32::init(clocks::configuration());
     clocks::guard();
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        // It times the current loop.
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
     let mut storage = start(peripherals, cause);
     loop {
         storage.serve();

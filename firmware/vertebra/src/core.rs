@@ -5,13 +5,14 @@ use eel_kinematics::{Joints, Policy, Pose, PoseError, Side};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
-use eel_units::{Angle, Instant, Torque};
+use eel_units::{Angle, AngularVelocity, Instant, Torque};
 
 use crate::command::{CommandStream, TARGET_TIMEOUT};
-use crate::current::{CurrentState, Electrical, Reading};
+use crate::current::Electrical;
 use crate::encoder::{Encoder, EncoderFault};
 use crate::events::{EVENTS, Event};
 use crate::freezing::Clock;
+use crate::friction::Compensation;
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
 use crate::limits::{MotorBounds, Situation, bounds};
@@ -35,10 +36,14 @@ pub(crate) struct Core {
     pub settings: Settings,
     pub impedance: Impedance,
     pub electrical: Electrical,
+    pub friction: Compensation,
+    /// What it takes of each motor now.
+    pub friction_torques: [Torque; 3],
+    /// Ticks since power-up, to spread over them what need not be done in each.
+    pub ticks: u8,
     pub now: Instant,
     pub operational: bool,
     pub encoders: [Encoder; 3],
-    pub currents: [CurrentState; 3],
     pub machine: Machine,
     pub stream: CommandStream,
     pub spline: Spline,
@@ -88,10 +93,12 @@ impl Core {
         Self {
             impedance: Impedance::new(&settings.gains),
             electrical: Electrical::new(&settings.motor),
+            friction: Compensation::new(&settings.motor.friction),
+            friction_torques: [Torque::ZERO; 3],
+            ticks: 0,
             now,
             operational: false,
             encoders: [encoder; 3],
-            currents: [CurrentState::default(); 3],
             machine: Machine::new(now),
             stream: CommandStream::new(now),
             spline: Spline::at_rest(Pose::default()),
@@ -134,14 +141,21 @@ impl Core {
 
     /// Puts other settings in the place of those it was made with, before the first tick.
     pub fn take_settings(&mut self, settings: Settings) {
-        self.impedance = Impedance::new(&settings.gains);
         self.settings = settings;
+        self.prepare();
+    }
+
+    /// Brings what the tick uses to the settings.
+    pub fn prepare(&mut self) {
+        self.impedance = Impedance::new(&self.settings.gains);
+        self.friction = Compensation::new(&self.settings.motor.friction);
     }
 
     /// Does one control tick.
     pub fn tick(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
         self.now = now;
         self.sample = Some(*sample);
+        self.ticks = self.ticks.wrapping_add(1);
         let motion = self.estimate(sample);
         self.watch(sample);
         self.bridge_missing_targets();
@@ -154,9 +168,6 @@ impl Core {
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
         let drives = self.drive(motion.as_ref(), sample);
-        for (state, drive) in self.currents.iter_mut().zip(&drives) {
-            state.note_drive(drive);
-        }
         self.forget_warnings();
         self.report();
         self.end_warnings();
@@ -282,47 +293,76 @@ impl Core {
         let Some(motion) = motion else {
             return [Drive::Brake; 3];
         };
+        if self.machine.state() != State::Run {
+            self.friction_torques = [Torque::ZERO; 3];
+        }
         let moment = match self.machine.state() {
             State::Run => {
                 let (elapsed, period) = self.stream.place(self.now);
-                self.pull(motion, self.spline.reference(elapsed, period))
+                let reference = self.spline.reference(elapsed, period);
+                let omega = reference.pose.angular_velocity(reference.rates);
+                self.compensate(motion, omega);
+                self.pull(motion, reference, omega)
             }
-            State::Hold => self.pull(motion, Reference::at_rest(self.hold)),
+            State::Hold => {
+                let rest = [AngularVelocity::ZERO; 3];
+                self.pull(motion, Reference::at_rest(self.hold), rest)
+            }
             State::Moment => self.push(motion),
             State::Motor => return self.drive_motors(motion, cap, sample),
             _ => self.impedance.damping(motion),
         };
-        self.share(motion, moment, cap, sample)
+        let bounds = self.bounds(cap, sample);
+        self.share(motion, moment, &bounds)
+    }
+
+    /// Takes the friction of the motors, which the reference turns with `omega`, every fourth tick.
+    fn compensate(&mut self, motion: &Motion, omega: [AngularVelocity; 3]) {
+        if self.ticks & 3 == 0 {
+            let speeds = motion.direct.jacobian.motor_rates(omega);
+            self.friction_torques = speeds.map(|speed| self.friction.torque(speed));
+        }
     }
 
     /// Returns the moment towards a reference, and remembers how far off the wrist is.
-    fn pull(&mut self, motion: &Motion, reference: Reference) -> [Torque; 3] {
-        let (moment, error) = self
-            .impedance
-            .moment(motion, &reference, &self.feed_forward);
+    fn pull(
+        &mut self,
+        motion: &Motion,
+        reference: Reference,
+        omega: [AngularVelocity; 3],
+    ) -> [Torque; 3] {
+        let feed = &self.feed_forward;
+        let (moment, error) = self.impedance.moment(motion, &reference.pose, omega, feed);
         let worst = error.iter().map(|axis| axis.abs()).max();
         self.watch_following(worst.unwrap_or_default());
         self.reference = Some(reference);
         moment
     }
 
-    /// Shares a moment among the motors within their bounds and turns torques into duties.
+    /// Shares a moment among the motors within what their bounds leave beside the friction.
     fn share(
         &mut self,
         motion: &Motion,
         moment: [Torque; 3],
-        command_cap: Option<Torque>,
-        sample: &Sample,
+        bounds: &[MotorBounds; 3],
     ) -> [Drive; 3] {
-        let bounds = self.bounds(command_cap, sample);
-        let shared = motion.direct.jacobian.share(
-            &moment,
-            &bounds.each_ref().map(|motor| motor.torque),
-            Policy::YawFirst,
-        );
+        let mut torques = self.friction_torques;
+        let mut limits = bounds.each_ref().map(|motor| motor.torque);
+        for (torque, bounds) in torques.iter_mut().zip(&mut limits) {
+            *torque = torque.bounded(bounds.low, bounds.high);
+            bounds.low -= *torque;
+            bounds.high -= *torque;
+        }
+        let shared = motion
+            .direct
+            .jacobian
+            .share(&moment, &limits, Policy::YawFirst);
         self.achieved = shared.achieved;
         self.unallocated = shared.unallocated;
-        self.apply(&bounds, &shared.torque, &shared.bound, sample)
+        for (torque, part) in torques.iter_mut().zip(shared.torque) {
+            *torque += part;
+        }
+        self.apply(bounds, &torques, &shared.bound)
     }
 
     /// Returns what each motor may produce.
@@ -330,46 +370,37 @@ impl Core {
         let situation = Situation {
             sample,
             angles: self.angles(),
-            speeds: self.encoders.each_ref().map(Encoder::speed),
+            speeds: self.speeds(),
             command_cap,
         };
         bounds(&self.settings.limits, &self.electrical, &situation)
     }
 
-    /// Turns torques within their bounds into duties; `sides` tells which bound holds a motor.
+    /// Lets the current loop produce torques that are within their bounds; `sides` tells which bound
+    /// holds a motor.
     pub fn apply(
         &mut self,
         bounds: &[MotorBounds; 3],
         torques: &[Torque; 3],
         sides: &[Option<Side>; 3],
-        sample: &Sample,
     ) -> [Drive; 3] {
-        let speeds = self.encoders.each_ref().map(Encoder::speed);
-        let mut limit = [LimitCode::None; 3];
         let mut drives = [Drive::Off; 3];
-        let motors = drives
-            .iter_mut()
-            .zip(&mut limit)
-            .zip(&mut self.currents)
-            .zip(bounds);
-        for (motor, (((drive, limit), state), bounds)) in motors.enumerate() {
-            let pick = |values: &[Torque; 3]| values.get(motor).copied().unwrap_or_default();
-            let speed = speeds.get(motor).copied().unwrap_or_default();
-            let measured = sample.current.get(motor).copied().unwrap_or_default();
-            *limit = bounds.reason(sides.get(motor).copied().flatten());
-            let reading = Reading {
-                speed,
-                current: measured,
-                supply: sample.supply,
-            };
-            let torque = pick(torques);
-            *drive = Drive::Duty(
-                self.electrical
-                    .duty(state, torque, &bounds.torque, &reading),
-            );
+        let motors = drives.iter_mut().zip(&mut self.effort.limit);
+        let asked = bounds
+            .iter()
+            .zip(sides)
+            .zip(torques)
+            .zip(self.encoders.each_ref());
+        for ((drive, limit), (((bounds, side), torque), encoder)) in motors.zip(asked) {
+            *limit = bounds.reason(*side);
+            *drive = Drive::Current(self.electrical.setpoint(*torque, encoder.speed()));
         }
-        self.effort.limit = limit;
         drives
+    }
+
+    /// Returns the speed of each motor.
+    pub fn speeds(&self) -> [AngularVelocity; 3] {
+        self.encoders.each_ref().map(Encoder::speed)
     }
 
     /// Brings what the head will read up to date.

@@ -1,36 +1,50 @@
-//! From torque to the share of the supply voltage that drives it.
+//! From torque to current, and from current to the share of the supply that drives it.
 //!
-//! The winding settles within a tick, so the voltage that a current needs is known: R i + k ω. A
-//! slow integral takes up what resistance and supply really are. The 20 kHz loop of the board will
-//! take this place.
+//! Once per control tick the wrist says which current each motor is to carry and which back-EMF it
+//! has. The loop in [`CurrentLoop`] does the rest at 20 kHz, where the platform converts the currents:
+//!
+//! v = k ω + R i* + Kp (i* − i) + ∫ Ki (i* − i), within the supply.
+//!
+//! The feed-forward alone would settle with the winding's own L/R; Kp = ωc L makes that faster, the
+//! integral takes up what resistance and back-EMF really are. What the supply can't give is taken back
+//! from the integral (back-calculation), so nothing winds up.
 
-use eel_kinematics::Bounds;
-use eel_units::{AngularVelocity, Current, Duty, Torque, Voltage, saturate};
+use eel_units::{AngularVelocity, Current, Duty, Torque, Voltage, multiply_high, saturate};
 
-use crate::io::Drive;
+use crate::io::{Drive, Setpoint};
 use crate::settings::Motor;
 
-/// Share of the current error that enters the integral each tick, as a shift.
-const INTEGRAL_SHIFT: u32 = 4;
-/// Most voltage that the integral may add.
-const INTEGRAL_LIMIT_MV: i64 = 3_000;
-/// Least supply that a duty is computed for.
-const SUPPLY_FLOOR_MV: i64 = 1_000;
+/// Times that [`CurrentLoop::update`] is called a second.
+pub const CURRENT_LOOP_HZ: u32 = 20_000;
 
 /// Torque constants in µN·m/A that the products below have room for: 1 mN·m/A to 100 N·m/A.
 pub const TORQUE_CONSTANTS: (u32, u32) = (1_000, 100_000_000);
-/// Resistances in mΩ that they have room for: 1 mΩ to 1 kΩ.
-pub const RESISTANCES: (u32, u32) = (1, 1_000_000);
+/// Resistances in mΩ that they have room for: 10 mΩ to 30 Ω.
+pub const RESISTANCES: (u32, u32) = (10, 30_000);
+/// Inductances in µH that they have room for: 1 µH to 9 mH.
+pub const INDUCTANCES: (u32, u32) = (1, 9_000);
+/// Supplies in mV that a duty is computed for: 1 V to 60 V.
+const SUPPLIES_MV: (i32, i32) = (1_000, 60_000);
 
-/// A motor's constants, prepared for the tick.
+/// The loop counts voltage in sixteenths of a millivolt.
+const UNITS: i32 = 16;
+/// Units per µA for 1 mΩ, Q32: 16 · 10⁻⁶ · 2³².
+const PER_MILLIOHM: u64 = 68_719;
+/// ωc in 1/s, times 1000: 2π · 500 Hz.
+const BANDWIDTH_MILLI: u64 = 3_141_593;
+/// Ki Δt as a share of the resistance, in 10⁻⁶: ωc Δt / 4. The integral is slower than the winding by
+/// a factor of four, so that a step of i* overshoots little.
+const INTEGRAL_SHARE: u64 = 39_270;
+/// Ki Δt / Kp = Δt R / 4 L, in 10⁻³ for R/L in mΩ/µH: 12.5.
+const RETURN_MILLI: u64 = 12_500;
+
+/// A motor's constants, prepared for the control tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Electrical {
     /// Current per torque: µA per N·m.
     microamps_per_newton_metre: i64,
     /// Torque per current: Q24 N·m per µA, in Q20.
     torque_per_microamp: i64,
-    /// Voltage per current: mV per µA, in Q30.
-    millivolts_per_microamp: i64,
     /// Voltage per speed: mV per Q24 rad/s, in Q34.
     millivolts_per_speed: i64,
     /// Torque per voltage: Q24 N·m per mV.
@@ -38,58 +52,15 @@ pub struct Electrical {
     current_limit: Current,
 }
 
-/// What the current controller of one motor remembers.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CurrentState {
-    wanted: Current,
-    integral_mv: i64,
-    saturated: bool,
-    /// The voltage of the last tick; none where the bridge was open.
-    applied_mv: Option<i64>,
-    emf_mv: i64,
-}
-
-/// What one motor's current depends on, as measured for this tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Reading {
-    /// Speed of the motor.
-    pub speed: AngularVelocity,
-    /// Mean current of the tick that ends.
-    pub current: Current,
-    /// Supply of the bridge.
-    pub supply: Voltage,
-}
-
-impl CurrentState {
-    /// Forgets what was learned, but not what the bridge does.
-    pub fn restart(&mut self) {
-        *self = Self {
-            applied_mv: self.applied_mv,
-            emf_mv: self.emf_mv,
-            ..Self::default()
-        };
-    }
-
-    /// Notes what the bridge does until the next tick, where that is no duty.
-    pub fn note_drive(&mut self, drive: &Drive) {
-        match drive {
-            Drive::Off => self.applied_mv = None,
-            Drive::Brake => self.applied_mv = Some(0),
-            Drive::Duty(_) => {}
-        }
-    }
-}
-
 impl Electrical {
     /// Prepares the constants; what is out of range is moved to its end.
     pub const fn new(motor: &Motor) -> Self {
-        let constant = within(motor.torque_constant, TORQUE_CONSTANTS);
-        let resistance = within(motor.resistance, RESISTANCES);
+        let constant = within(motor.torque_constant, TORQUE_CONSTANTS) as i64;
+        let resistance = within(motor.resistance, RESISTANCES) as i64;
         Self {
             microamps_per_newton_metre: 1_000_000_000_000 / constant,
             // 2⁴⁴ / 10¹² = 17.592186.
             torque_per_microamp: constant * 17_592_186 / 1_000_000,
-            millivolts_per_microamp: (resistance << 30) / 1_000_000,
             millivolts_per_speed: (constant << 10) / 1_000,
             // k/R: µN·m/A over mΩ is 10⁻⁶ N·m per mV, times 2²⁴.
             torque_per_millivolt: (constant << 24) / resistance / 1_000_000,
@@ -114,54 +85,14 @@ impl Electrical {
         (low.bounded(-limit, limit), high.bounded(-limit, limit))
     }
 
-    /// Returns the duty that lets the motor produce `torque`, from what was measured in the tick
-    /// before. The current that was measured holds the next one within `bounds`, whatever the
-    /// speed was taken for.
-    pub fn duty(
-        &self,
-        state: &mut CurrentState,
-        torque: Torque,
-        bounds: &Bounds,
-        reading: &Reading,
-    ) -> Duty {
-        let error = self.voltage(state.wanted) - self.voltage(reading.current);
-        if !state.saturated {
-            let integral = state.integral_mv + (error >> INTEGRAL_SHIFT);
-            state.integral_mv = integral.clamp(-INTEGRAL_LIMIT_MV, INTEGRAL_LIMIT_MV);
-        }
-        state.wanted = self.current(torque);
-        let emf = self.back_emf(reading.speed);
-        let voltage = self.voltage(state.wanted) + emf + state.integral_mv;
-        // The voltage that drove the measured current, moved by the change of the back-EMF.
-        let before = match state.applied_mv {
-            Some(applied) => applied + (emf - state.emf_mv),
-            None => emf,
-        };
-        let to_current = |bound: Torque| {
-            before + self.voltage(self.current(bound)) - self.voltage(reading.current)
-        };
-        let (low, high) = (to_current(bounds.low), to_current(bounds.high));
-        let held = voltage.max(low).min(high.max(low));
-        let supply = i64::from(reading.supply.to_millivolts()).max(SUPPLY_FLOOR_MV);
-        let applied = held.clamp(-supply, supply);
-        state.saturated = applied != voltage;
-        state.applied_mv = Some(applied);
-        state.emf_mv = emf;
-        // The machine divides 32 bits itself, and no supply has more millivolts than 16.
-        Duty::from_q15(match u16::try_from(supply) {
-            Ok(supply) => applied as i32 * 32_767 / i32::from(supply).max(1),
-            Err(_) => (applied * 32_767 / supply) as i32,
-        })
-    }
-
-    /// Returns the current of a torque, within the bridge's limit.
-    fn current(&self, torque: Torque) -> Current {
+    /// Returns what the current loop is to do for a torque at a speed.
+    pub fn setpoint(&self, torque: Torque, speed: AngularVelocity) -> Setpoint {
         let current = (i64::from(torque.to_q24()) * self.microamps_per_newton_metre) >> 24;
-        Current::from_microamps(saturate(current)).bounded(-self.current_limit, self.current_limit)
-    }
-
-    fn voltage(&self, current: Current) -> i64 {
-        (i64::from(current.to_microamps()) * self.millivolts_per_microamp) >> 30
+        let limit = self.current_limit;
+        Setpoint {
+            current: Current::from_microamps(saturate(current)).bounded(-limit, limit),
+            emf: Voltage::from_millivolts(saturate(self.back_emf(speed))),
+        }
     }
 
     fn back_emf(&self, speed: AngularVelocity) -> i64 {
@@ -169,111 +100,166 @@ impl Electrical {
     }
 }
 
-const fn within(value: u32, (least, most): (u32, u32)) -> i64 {
+/// What a bridge does until the next turn of the current loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Switching {
+    /// All switches open.
+    Off,
+    /// Low sides on.
+    Brake,
+    /// This share of the supply, positive with positive torque.
+    Duty(Duty),
+}
+
+/// The current loop of three motors.
+#[derive(Clone, Debug)]
+pub struct CurrentLoop {
+    gains: LoopGains,
+    channels: [Channel; 3],
+    /// The supply, in units.
+    supply: i32,
+    /// Q15 duty per unit, Q28.
+    duty_per_unit: i32,
+}
+
+/// Gains in units per µA, Q32; the last in units per unit.
+#[derive(Clone, Copy, Debug)]
+struct LoopGains {
+    resistance: i32,
+    proportional: i32,
+    integral: i32,
+    back: i32,
+}
+
+/// One motor in the loop.
+#[derive(Clone, Copy, Debug)]
+struct Channel {
+    drive: Drive,
+    /// i*, µA.
+    wanted: i32,
+    /// k ω + R i* within the supply, units.
+    feed: i32,
+    /// Units.
+    integral: i32,
+}
+
+impl Channel {
+    const OFF: Self = Self {
+        drive: Drive::Off,
+        wanted: 0,
+        feed: 0,
+        integral: 0,
+    };
+}
+
+impl CurrentLoop {
+    /// Makes a loop whose bridges are off.
+    pub const fn new(motor: &Motor) -> Self {
+        let resistance = within(motor.resistance, RESISTANCES) as u64;
+        let inductance = within(motor.inductance, INDUCTANCES) as u64;
+        Self {
+            gains: LoopGains {
+                resistance: at_most(resistance * PER_MILLIOHM),
+                // µH / s is mΩ / 1000; the bandwidth has its own thousand.
+                proportional: at_most(inductance * BANDWIDTH_MILLI / 1_000_000 * PER_MILLIOHM),
+                integral: at_most(resistance * INTEGRAL_SHARE * PER_MILLIOHM / 1_000_000),
+                back: at_most(((resistance * RETURN_MILLI) << 32) / inductance / 1_000_000),
+            },
+            channels: [Channel::OFF; 3],
+            supply: 0,
+            duty_per_unit: 0,
+        }
+    }
+
+    /// Takes what a control tick decides and the supply that it measured.
+    pub fn set(&mut self, drives: &[Drive; 3], supply: Voltage) {
+        let (least, most) = SUPPLIES_MV;
+        let supply = supply.to_millivolts().max(least).min(most);
+        self.supply = supply * UNITS;
+        // 32767 · 2¹⁶ / mV is 32767 · 2²⁰ / units; eight bits more make Q28.
+        self.duty_per_unit = ((32_767 << 16) / supply) << 8;
+        for (channel, drive) in self.channels.iter_mut().zip(drives) {
+            channel.drive = *drive;
+            match drive {
+                Drive::Current(Setpoint { current, emf }) => {
+                    channel.wanted = current.to_microamps();
+                    let drop = multiply_high(channel.wanted, self.gains.resistance);
+                    let feed = emf
+                        .to_millivolts()
+                        .saturating_mul(UNITS)
+                        .saturating_add(drop);
+                    // What the supply can't give is not for the integral to take back.
+                    channel.feed = feed.min(self.supply).max(-self.supply);
+                }
+                Drive::Off | Drive::Brake => {
+                    *channel = Channel {
+                        drive: *drive,
+                        ..Channel::OFF
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes the currents of this moment and returns what the bridges do in the next period.
+    #[inline]
+    pub fn update(&mut self, measured: [Current; 3]) -> [Switching; 3] {
+        let mut all = [Switching::Off; 3];
+        let channels = self.channels.iter_mut().zip(measured).zip(&mut all);
+        for ((channel, measured), switching) in channels {
+            *switching = match channel.drive {
+                Drive::Off => Switching::Off,
+                Drive::Brake => Switching::Brake,
+                Drive::Current(_) => {
+                    let duty = channel.advance(&self.gains, self.supply, measured);
+                    // Q28 × 2⁴ units: the high word of the product is the duty.
+                    Switching::Duty(Duty::from_q15(multiply_high(duty << 4, self.duty_per_unit)))
+                }
+            };
+        }
+        all
+    }
+}
+
+impl Channel {
+    /// Returns the voltage for the next period, in units, within the supply.
+    #[inline]
+    fn advance(&mut self, gains: &LoopGains, supply: i32, measured: Current) -> i32 {
+        let error = self.wanted.saturating_sub(measured.to_microamps());
+        let voltage = self
+            .feed
+            .saturating_add(self.integral)
+            .saturating_add(multiply_high(error, gains.proportional));
+        let held = voltage.min(supply).max(-supply);
+        let change = multiply_high(error, gains.integral)
+            .saturating_add(multiply_high(held.saturating_sub(voltage), gains.back));
+        self.integral = self
+            .integral
+            .saturating_add(change)
+            .min(supply)
+            .max(-supply);
+        held
+    }
+}
+
+const fn within(value: u32, (least, most): (u32, u32)) -> u32 {
     if value < least {
-        least as i64
+        least
     } else if value > most {
-        most as i64
+        most
     } else {
-        value as i64
+        value
+    }
+}
+
+/// Returns a gain as far as there is room for it.
+const fn at_most(gain: u64) -> i32 {
+    if gain > i32::MAX as u64 {
+        i32::MAX
+    } else {
+        gain as i32
     }
 }
 
 #[cfg(test)]
-mod tests {
-    #![expect(clippy::float_arithmetic, reason = "the oracle is a winding in f64")]
-
-    use super::*;
-
-    const SUPPLY: Voltage = Voltage::from_millivolts(24_000);
-    const WIDE: Bounds = Bounds {
-        low: Torque::from_millinewton_metres(-3_000),
-        high: Torque::from_millinewton_metres(3_000),
-    };
-
-    fn motor() -> Electrical {
-        Electrical::new(&Motor::PROTOTYPE)
-    }
-
-    fn reading(speed: f64, current: f64) -> Reading {
-        Reading {
-            speed: AngularVelocity::from_milliradians_per_second((speed * 1e3) as i32),
-            current: Current::from_microamps((current * 1e6) as i32),
-            supply: SUPPLY,
-        }
-    }
-
-    /// The winding: the current that a duty drives at a speed, with another resistance than set.
-    fn winding(duty: Duty, speed: f64, resistance: f64) -> f64 {
-        let voltage = 24.0 * f64::from(duty.to_q15()) / 32_767.0;
-        (voltage - 1.488 * speed) / resistance
-    }
-
-    #[test]
-    fn drives_the_current_that_the_torque_needs() {
-        let mut state = CurrentState::default();
-        let torque = Torque::from_millinewton_metres(1_488);
-        let duty = motor().duty(&mut state, torque, &WIDE, &reading(3.0, 0.0));
-        assert!((winding(duty, 3.0, 5.8) - 1.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn learns_a_resistance_that_differs_from_the_settings() {
-        let mut state = CurrentState::default();
-        let torque = Torque::from_millinewton_metres(744);
-        let mut current = 0.0;
-        for _ in 0..200 {
-            let duty = motor().duty(&mut state, torque, &WIDE, &reading(0.0, current));
-            current = winding(duty, 0.0, 7.0);
-        }
-        assert!((current - 0.5).abs() < 5e-3, "{current}");
-    }
-
-    #[test]
-    fn a_speed_that_is_taken_wrong_does_not_break_the_bound() {
-        // The crank slows down by 60 rad/s² and the observer lags by 2 rad/s.
-        let mut state = CurrentState::default();
-        let peak = 3.0 / 1.488;
-        let mut current = 0.0;
-        let mut speed = 6.0;
-        for tick in 0..100 {
-            let duty = motor().duty(&mut state, WIDE.high, &WIDE, &reading(speed + 2.0, current));
-            speed -= 0.06;
-            current = winding(duty, speed, 5.8);
-            if tick > 0 {
-                assert!(current < peak * 1.02, "{current} A in tick {tick}");
-            }
-        }
-        assert!(current > peak * 0.98, "{current} A at the end");
-    }
-
-    #[test]
-    fn reaches_less_torque_the_faster_it_turns() {
-        let speed = AngularVelocity::from_milliradians_per_second(15_000);
-        let (low, high) = motor().reach(SUPPLY, speed);
-        let expected = 1.488 * (24.0 - 1.488 * 15.0) / 5.8;
-        assert!((f64::from(high.to_millinewton_metres()) / 1e3 - expected).abs() < 2e-3);
-        assert_eq!(low, -motor().torque(Motor::PROTOTYPE.current_limit));
-    }
-
-    #[test]
-    fn any_measurement_leaves_the_duty_in_range() {
-        let mut state = CurrentState::default();
-        for raw in [i32::MIN, -1, 0, 1, i32::MAX] {
-            for supply in [i32::MIN, 0, 24_000, i32::MAX] {
-                let bound = Torque::from_q24(raw);
-                let reading = Reading {
-                    speed: AngularVelocity::from_q24(raw),
-                    current: Current::from_microamps(raw),
-                    supply: Voltage::from_millivolts(supply),
-                };
-                let bounds = Bounds {
-                    low: bound,
-                    high: -bound,
-                };
-                let duty = motor().duty(&mut state, bound, &bounds, &reading);
-                assert!(duty.abs() <= Duty::FULL);
-            }
-        }
-    }
-}
+mod tests;

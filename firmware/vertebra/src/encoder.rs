@@ -12,10 +12,10 @@ const DISAGREEMENT: i64 = (20 << 29) / 1_000;
 const IMPLAUSIBLE_LIMIT: u8 = 5;
 /// Invalid absolute readings in a row that make a fault: 50 ms.
 const INVALID_LIMIT: u8 = 50;
-/// Correction of the speed per tick and position error: ω₀² Δt with ω₀ = 300 rad/s.
-const SPEED_GAIN: i64 = 90;
+/// Correction of the speed per tick and position error: ω₀² Δt with ω₀ = 600 rad/s.
+const SPEED_GAIN: i64 = 360;
 /// Correction of the position per tick: 2 ω₀ Δt in Q16.
-const POSITION_GAIN: i64 = 39_322;
+const POSITION_GAIN: i64 = 78_643;
 /// The largest error that is followed, 512 rad in Q37: the gains have room for it, no crank has.
 const FAR: i64 = 1 << 46;
 /// One tick in Q24 rad/s → Q29 rad: 2⁵/1000 in Q16.
@@ -140,7 +140,7 @@ impl Encoder {
         self.angle
     }
 
-    /// Returns the crank's speed, low-passed at 300 rad/s.
+    /// Returns the crank's speed, low-passed at 600 rad/s.
     pub fn speed(&self) -> AngularVelocity {
         AngularVelocity::from_q24(saturate(self.observer.speed))
     }

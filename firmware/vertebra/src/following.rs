@@ -7,7 +7,6 @@ use eel_units::{Instant, Torque};
 
 use crate::command::{BRIDGED_PERIODS, Received};
 use crate::core::Core;
-use crate::current::CurrentState;
 use crate::machine::Outcome;
 use crate::settings::Settings;
 use crate::spline::Spline;
@@ -132,7 +131,6 @@ impl Core {
         }
         let after = self.machine.state();
         if after != before {
-            self.currents.iter_mut().for_each(CurrentState::restart);
             self.lost_ticks = 0;
             self.forget_feed_forward();
             self.motor_torque = [Torque::ZERO; 3];

@@ -4,7 +4,6 @@ use eel_kinematics::{Direct, Pose, Rotation};
 use eel_units::{Angle, AngularVelocity, Torque, saturate};
 
 use crate::settings::Gains;
-use crate::spline::Reference;
 
 /// Gains as the tick uses them, Q16 N·m/rad and N·m·s/rad.
 #[derive(Clone, Copy, Debug)]
@@ -49,16 +48,17 @@ impl Impedance {
         }
     }
 
-    /// Returns the moment towards `reference`, and the rotation vector that leads there.
+    /// Returns the moment towards `pose` with the angular velocity `omega`, and the rotation vector that
+    /// leads there.
     pub fn moment(
         &self,
         motion: &Motion,
-        reference: &Reference,
+        pose: &Pose,
+        omega: [AngularVelocity; 3],
         feed: &FeedForward,
     ) -> ([Torque; 3], [Angle; 3]) {
-        let target = Rotation::from_pose(&reference.pose);
+        let target = Rotation::from_pose(pose);
         let error = motion.direct.rotation.error_to(&target);
-        let omega = reference.pose.angular_velocity(reference.rates);
         let scale = i64::from(feed.stiffness);
         let spring = product(self.stiffness, error.map(Angle::to_q29), |torque| {
             // Q16 × Q29 is Q45; the torque is Q24. The scale is Q15.

@@ -1,6 +1,6 @@
 //! What a vertebra measures and what it does to its motors.
 
-use eel_units::{Angle, Current, Duty, Temperature, Voltage};
+use eel_units::{Angle, Current, Temperature, Voltage};
 
 /// Everything measured for one control tick; motors in the order 1, 2, 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +52,15 @@ pub enum Drive {
     Off,
     /// Low sides on: the motor is shorted and brakes itself.
     Brake,
-    /// Applies this share of the supply voltage, positive with positive torque.
-    Duty(Duty),
+    /// The current loop holds a current.
+    Current(Setpoint),
+}
+
+/// What the current loop of a motor is to hold until the next tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Setpoint {
+    /// The current, positive with positive torque.
+    pub current: Current,
+    /// The back-EMF at the motor's speed, as feed-forward.
+    pub emf: Voltage,
 }

@@ -7,11 +7,11 @@
 
 use eel_canopen::{Frame, Id};
 use eel_protocol::NodeId;
-use eel_units::{Angle, Current, Duty, Instant, Temperature, Voltage};
+use eel_units::{Angle, Current, Instant, Temperature, Voltage};
 use embedded_can::{ExtendedId, StandardId};
 use heapless::Vec;
 
-use crate::io::{Actions, Drive, Sample};
+use crate::io::{Actions, Drive, Sample, Setpoint};
 
 /// The layout; another one has another number.
 pub const VERSION: u8 = 3;
@@ -25,7 +25,7 @@ pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + 1 + MAX_FRAMES * FRAM
 const TIME: usize = 8;
 const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1;
 const FRAME: usize = 4 + 1 + 8;
-const ACTIONS: usize = 3 * (1 + 4) + 1 + 4;
+const ACTIONS: usize = 3 * (1 + 4 + 4) + 1 + 4;
 
 const _: () = assert!(ACTIONS + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
@@ -247,13 +247,14 @@ impl Output {
     pub fn encode(&self) -> Packet {
         let mut packet = Packet::new(Kind::Output);
         for drive in self.actions.drives {
-            let (code, duty) = match drive {
-                Drive::Off => (0, 0),
-                Drive::Brake => (1, 0),
-                Drive::Duty(duty) => (2, duty.to_q15()),
+            let (code, setpoint) = match drive {
+                Drive::Off => (0, Setpoint::default()),
+                Drive::Brake => (1, Setpoint::default()),
+                Drive::Current(setpoint) => (2, setpoint),
             };
             packet.put(&[code]);
-            packet.put_i32(duty);
+            packet.put_i32(setpoint.current.to_microamps());
+            packet.put_i32(setpoint.emf.to_millivolts());
         }
         packet.put(&[u8::from(self.actions.chain_out)]);
         packet.put_i32(self.actions.tick_trim_ns);
@@ -269,10 +270,13 @@ impl Output {
         let mut reader = Reader { bytes: body };
         let mut drives = [Drive::Off; 3];
         for drive in &mut drives {
-            *drive = match (reader.take_u8()?, reader.take_i32()?) {
-                (0, 0) => Drive::Off,
-                (1, 0) => Drive::Brake,
-                (2, duty) => Drive::Duty(Duty::from_q15(duty)),
+            *drive = match (reader.take_u8()?, reader.take_i32()?, reader.take_i32()?) {
+                (0, 0, 0) => Drive::Off,
+                (1, 0, 0) => Drive::Brake,
+                (2, current, emf) => Drive::Current(Setpoint {
+                    current: Current::from_microamps(current),
+                    emf: Voltage::from_millivolts(emf),
+                }),
                 _ => return Err(PacketError::Value),
             };
         }

@@ -6,7 +6,6 @@ use eel_protocol::dictionary::Field;
 use eel_units::{Angle, Duration, Instant, Temperature, Torque};
 
 use crate::core::Core;
-use crate::impedance::Impedance;
 use crate::io::Sample;
 
 /// Microradians in a radian.
@@ -36,6 +35,8 @@ pub(crate) struct Counters {
 pub(crate) struct Timing {
     loop_last: Duration,
     loop_max: Duration,
+    /// Last and longest turn of the current loop, ns.
+    pub current_loop_ns: (u32, u32),
     last_sync: Option<Instant>,
     sync_period_us: i64,
     sync_phase_us: i64,
@@ -116,7 +117,10 @@ impl Core {
             | Field::RangeYaw
             | Field::RangePitch
             | Field::RangeRoll
-            | Field::RateLimit => self.settings.value(field).unwrap_or_default(),
+            | Field::RateLimit
+            | Field::FrictionCoulomb
+            | Field::FrictionViscous
+            | Field::FrictionSpeed => self.settings.value(field).unwrap_or_default(),
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
             Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
@@ -131,6 +135,8 @@ impl Core {
             Field::LoopLast => i64::from(self.timing.loop_last.to_micros()),
             Field::LoopMax => i64::from(self.timing.loop_max.to_micros()),
             Field::SyncPhase => self.timing.sync_phase_us,
+            Field::CurrentLoopLast => i64::from(self.timing.current_loop_ns.0),
+            Field::CurrentLoopMax => i64::from(self.timing.current_loop_ns.1),
             // The rest is served beside the core, or streams.
             Field::ScopeChannel1
             | Field::ScopeChannel2
@@ -200,7 +206,7 @@ impl Core {
         if !self.settings.set(field, value) {
             return Err(Abort::ReadOnly);
         }
-        self.impedance = Impedance::new(&self.settings.gains);
+        self.prepare();
         Ok(())
     }
 }

@@ -8,7 +8,6 @@ use eel_kinematics::{Bounds, Policy, Pose, Side};
 use eel_units::{AngularVelocity, Torque};
 
 use crate::core::Core;
-use crate::encoder::Encoder;
 use crate::impedance::Motion;
 use crate::io::{Drive, Sample};
 
@@ -35,8 +34,7 @@ impl Core {
         let bounds = self.bounds(cap, sample);
         let limits = bounds.each_ref().map(|motor| motor.torque);
         let mut torques = self.motor_torque;
-        let speeds = self.encoders.each_ref().map(Encoder::speed);
-        for (torque, speed) in torques.iter_mut().zip(speeds) {
+        for (torque, speed) in torques.iter_mut().zip(self.speeds()) {
             let excess = speed - speed.bounded(-CRANK_SPEED, CRANK_SPEED);
             // 1 N·m·s/rad: both are Q24.
             *torque -= Torque::from_q24(excess.to_q24());
@@ -56,7 +54,7 @@ impl Core {
             *side = side_of(*torque, bounds);
             *torque = torque.bounded(bounds.low, bounds.high);
         }
-        self.apply(&bounds, &torques, &sides, sample)
+        self.apply(&bounds, &torques, &sides)
     }
 
     /// Returns the moment that leads back into the workspace and below the rate limit; `None` inside.

@@ -7,7 +7,7 @@ use eel_protocol::NodeId;
 use eel_protocol::dictionary::Field;
 use eel_units::{Angle, AngularVelocity, Current, Temperature, Torque, Voltage};
 
-use crate::current::{RESISTANCES, TORQUE_CONSTANTS};
+use crate::current::{INDUCTANCES, RESISTANCES, TORQUE_CONSTANTS};
 
 /// Everything that is set for one vertebra.
 #[derive(Clone, Copy, Debug)]
@@ -85,12 +85,27 @@ pub struct Motor {
     pub torque_constant: u32,
     /// Resistance of winding and bridge in mΩ.
     pub resistance: u32,
+    /// Inductance of the winding in µH.
+    pub inductance: u32,
+    /// Friction of motor and gear.
+    pub friction: Friction,
     /// Quadrature counts per turn of the crank.
     pub counts_per_turn: u32,
     /// Most current of the bridge.
     pub current_limit: Current,
     /// Fastest believable speed of the crank.
     pub speed_limit: AngularVelocity,
+}
+
+/// What a crank needs to turn without a load: the controller adds it along the reference's motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Friction {
+    /// Coulomb friction.
+    pub coulomb: Torque,
+    /// Viscous friction in mN·m·s/rad.
+    pub viscous: u32,
+    /// Speed of the reference from which on the Coulomb friction is whole; below, in proportion.
+    pub speed: AngularVelocity,
 }
 
 impl Settings {
@@ -133,9 +148,11 @@ impl Settings {
         let Motor {
             torque_constant,
             resistance,
+            inductance,
             counts_per_turn,
             ..
         } = self.motor;
+        let friction = &self.motor.friction;
         let is_in = |value: u32, (least, most): (u32, u32)| (least..=most).contains(&value);
         let positive = [workspace.yaw, workspace.pitch, workspace.roll]
             .into_iter()
@@ -152,6 +169,9 @@ impl Settings {
             && *damped_torque >= Torque::ZERO
             && is_in(torque_constant, TORQUE_CONSTANTS)
             && is_in(resistance, RESISTANCES)
+            && is_in(inductance, INDUCTANCES)
+            && friction.coulomb >= Torque::ZERO
+            && friction.speed > AngularVelocity::ZERO
             && counts_per_turn > 0
             && self.motor.current_limit > Current::ZERO
             && self.motor.speed_limit > AngularVelocity::ZERO
@@ -166,6 +186,7 @@ impl Settings {
         let (gains, limits) = (&self.gains, &self.limits);
         let [stiffness_x, stiffness_y, stiffness_z] = gains.stiffness.map(i64::from);
         let [damping_x, damping_y, damping_z] = gains.damping.map(i64::from);
+        let friction = &self.motor.friction;
         let angle = |angle: Angle| i64::from(angle.to_tenth_milliradians());
         Some(match field {
             Field::StiffnessX => stiffness_x,
@@ -178,7 +199,10 @@ impl Settings {
             Field::RangeYaw => angle(limits.workspace.yaw),
             Field::RangePitch => angle(limits.workspace.pitch),
             Field::RangeRoll => angle(limits.workspace.roll),
-            Field::RateLimit => (i64::from(limits.rate.to_q24()) * 1_000 + (1 << 23)) >> 24,
+            Field::RateLimit => milliradians_per_second(limits.rate),
+            Field::FrictionCoulomb => i64::from(friction.coulomb.to_millinewton_metres()),
+            Field::FrictionViscous => i64::from(friction.viscous),
+            Field::FrictionSpeed => milliradians_per_second(friction.speed),
             _ => return None,
         })
     }
@@ -188,6 +212,7 @@ impl Settings {
     pub(crate) fn set(&mut self, field: Field, value: i64) -> bool {
         let angle = Angle::from_tenth_milliradians(value as i16);
         let (gains, limits) = (&mut self.gains, &mut self.limits);
+        let friction = &mut self.motor.friction;
         match field {
             Field::StiffnessX => gains.stiffness[0] = value as u32,
             Field::StiffnessY => gains.stiffness[1] = value as u32,
@@ -204,10 +229,22 @@ impl Settings {
             Field::RateLimit => {
                 limits.rate = AngularVelocity::from_milliradians_per_second(value as i32);
             }
+            Field::FrictionCoulomb => {
+                friction.coulomb = Torque::from_millinewton_metres(value as i32);
+            }
+            Field::FrictionViscous => friction.viscous = value as u32,
+            Field::FrictionSpeed => {
+                friction.speed = AngularVelocity::from_milliradians_per_second(value as i32);
+            }
             _ => return false,
         }
         true
     }
+}
+
+/// Returns a speed in mrad/s, rounded.
+fn milliradians_per_second(speed: AngularVelocity) -> i64 {
+    (i64::from(speed.to_q24()) * 1_000 + (1 << 23)) >> 24
 }
 
 /// Returns the raw number with which a field of the dictionary leaves the factory.
@@ -276,11 +313,19 @@ impl Limits {
 }
 
 impl Motor {
-    /// A 24 V brushed motor of the 26 mm class: 34.6 mN·m/A, 5.8 Ω, gear 43:1, 2048 counts a turn
-    /// of its shaft.
+    /// A 24 V brushed motor of the 26 mm class: 34.6 mN·m/A, 5.8 Ω, 0.55 mH, gear 43:1, 2048 counts a
+    /// turn of its shaft.
     pub const PROTOTYPE: Self = Self {
         torque_constant: 1_488_000,
         resistance: 5_800,
+        inductance: 550,
+        friction: Friction {
+            coulomb: Torque::from_millinewton_metres(factory(Field::FrictionCoulomb) as i32),
+            viscous: factory(Field::FrictionViscous) as u32,
+            speed: AngularVelocity::from_milliradians_per_second(
+                factory(Field::FrictionSpeed) as i32
+            ),
+        },
         counts_per_turn: 88_064,
         current_limit: Current::from_milliamps(2_500),
         speed_limit: AngularVelocity::from_milliradians_per_second(40_000),

@@ -218,6 +218,12 @@ impl Vertebra {
         self.core.timing.note_loop(duration);
     }
 
+    /// Tells the vertebra how long the last turn of the current loop took, and the longest since
+    /// power-up, in ns.
+    pub fn note_current_loop(&mut self, last_ns: u32, longest_ns: u32) {
+        self.core.timing.current_loop_ns = (last_ns, longest_ns);
+    }
+
     /// Tells the vertebra how many frames its platform has lost on the way in and out.
     pub fn note_overruns(&mut self, received: u32, transmitted: u32) {
         self.core.counters.receive_overruns = received;

@@ -4,8 +4,8 @@
 use eel_canopen::{Frame, NmtCommand};
 use eel_kinematics::{Joints, Pose};
 use eel_protocol::{Mode, State};
-use eel_units::{Angle, Current, Duty, Temperature, Voltage};
-use eel_vertebra::{Drive, Limits, Sample};
+use eel_units::{Angle, Current, Temperature, Voltage};
+use eel_vertebra::{Drive, Limits, Motor, Sample};
 
 use support::{Bench, NODE, Random, counts, healthy, radians};
 
@@ -65,8 +65,9 @@ fn check(bench: &Bench, before: State) {
     let state = bench.state();
     let drives = bench.drives;
     for drive in drives {
-        if let Drive::Duty(duty) = drive {
-            assert!(duty.abs() <= Duty::FULL, "{duty:?}");
+        if let Drive::Current(setpoint) = drive {
+            let limit = Motor::PROTOTYPE.current_limit;
+            assert!(setpoint.current.abs() <= limit, "{setpoint:?}");
         }
     }
     match state {

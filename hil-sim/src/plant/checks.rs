@@ -341,7 +341,7 @@ pub fn p8() -> Check {
     )
 }
 
-/// P9: an eel at rest stays at rest for 60 s, bridges off, then shorted, then at zero duty.
+/// P9: an eel at rest stays at rest for 60 s, bridges off, then shorted, then at no current.
 pub fn p9() -> Check {
     let config = Config::default();
     let mut plant = Plant::new(&config, 1);
@@ -349,7 +349,7 @@ pub fn p9() -> Check {
     let counts: Vec<_> = (0..JOINTS)
         .map(|joint| plant.sample(joint).encoder_counts)
         .collect();
-    let zero = Drive::Duty(eel_units::Duty::ZERO);
+    let zero = Drive::Current(eel_vertebra::Setpoint::default());
     let mut worst: f64 = 0.0;
     for step in 0..120_000 {
         let drive = [Drive::Off, Drive::Brake, zero][step / 40_000];

@@ -105,6 +105,8 @@ pub struct Motor {
     pub constant: f64,
     /// Winding resistance, Ω.
     pub resistance_ohm: f64,
+    /// Winding inductance, H.
+    pub inductance_h: f64,
     /// Rotor inertia, kg·m².
     pub inertia: f64,
     /// Coulomb friction, N·m.
@@ -240,6 +242,7 @@ impl Default for Motor {
         Self {
             constant: 1.488,
             resistance_ohm: 5.8,
+            inductance_h: 0.55e-3,
             inertia: 2.03e-3,
             coulomb_nm: 0.06,
             coulomb_speed: 0.005,

@@ -17,6 +17,7 @@ pub mod integrate;
 pub mod joint;
 pub mod measures;
 pub mod motor;
+mod power;
 pub mod random;
 #[cfg(test)]
 mod tests;
@@ -93,7 +94,7 @@ impl Plant {
         for (joint, acceleration) in accelerations.into_iter().enumerate() {
             let (wrist, rate) = (&mut self.wrists[joint], self.state.rates[joint]);
             self.moments[joint] = wrist.settle(&self.config, rate, acceleration);
-            drawn_a += wrist.supply_current_a(self.supply_v);
+            drawn_a += wrist.supply_current_a();
         }
         self.supply_v = self.config.supply_v - self.config.supply_resistance_ohm * drawn_a;
         self.account(&accelerations);

@@ -1,7 +1,5 @@
 //! One brushed motor with gear, bridge, encoder and temperatures, seen at the gear's output.
 
-use eel_vertebra::Drive;
-
 use super::config::Motor;
 
 /// A motor's torque as a line over its speed at the end of the step: `torque − slope · speed`.
@@ -11,6 +9,17 @@ pub struct Line {
     pub torque: f64,
     /// Damping, N·m·s/rad.
     pub slope: f64,
+}
+
+/// What a bridge does to the winding.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bridge {
+    /// All switches open: no current.
+    Open,
+    /// A voltage, V; zero shorts the winding. The current settles within the step.
+    Voltage(f64),
+    /// The current loop holds a current: its mean over the step, A.
+    Current(f64),
 }
 
 /// What a motor carries from step to step.
@@ -26,6 +35,30 @@ pub struct MotorState {
     current_count: f64,
 }
 
+/// How a winding's current follows its voltage within one period of the current loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Winding {
+    /// e^(−R Δt / L): what is left of a current.
+    decay: f64,
+}
+
+impl Winding {
+    /// Takes a motor whose loop has a period, s.
+    pub fn new(motor: &Motor, period_s: f64) -> Self {
+        let exponent = motor.resistance_ohm * period_s / motor.inductance_h;
+        Self {
+            decay: libm::exp(-exponent),
+        }
+    }
+
+    /// Returns the current after a period at a voltage and a speed, within the bridge's limit, A.
+    pub fn advance(&self, motor: &Motor, current_a: f64, voltage_v: f64, speed: f64) -> f64 {
+        let settled = (voltage_v - motor.constant * speed) / motor.resistance_ohm;
+        let current = settled + (current_a - settled) * self.decay;
+        current.clamp(-motor.current_limit_a, motor.current_limit_a)
+    }
+}
+
 impl MotorState {
     /// Starts cold and without current.
     pub fn new(motor: &Motor) -> Self {
@@ -38,12 +71,19 @@ impl MotorState {
         }
     }
 
-    /// Sets the current at the end of a step, and warms up.
-    pub fn advance(&mut self, motor: &Motor, voltage: Option<f64>, speed: f64, step: f64) {
-        self.current_a = current(motor, voltage, speed);
-        self.current_sum += self.current_a;
+    /// Ends a step at a speed, with what the bridge did in it, and warms up.
+    pub fn advance(&mut self, motor: &Motor, bridge: Bridge, speed: f64, step: f64) {
+        let mean = match bridge {
+            Bridge::Open => 0.0,
+            Bridge::Voltage(volts) => settled(motor, volts, speed),
+            Bridge::Current(mean) => mean,
+        };
+        if !matches!(bridge, Bridge::Current(_)) {
+            self.current_a = mean;
+        }
+        self.current_sum += mean;
         self.current_count += 1.0;
-        let heat = self.current_a * self.current_a * motor.resistance_ohm;
+        let heat = mean * mean * motor.resistance_ohm;
         let inwards = (self.winding_c - self.housing_c) / motor.winding_k_per_w;
         let outwards = (self.housing_c - motor.ambient_c) / motor.housing_k_per_w;
         self.winding_c += step * (heat - inwards) / motor.winding_j_per_k;
@@ -61,43 +101,34 @@ impl MotorState {
     }
 }
 
-/// Returns the voltage a bridge applies; `None` when its switches are open.
-pub fn voltage(drive: Drive, supply_v: f64) -> Option<f64> {
-    match drive {
-        Drive::Off => None,
-        Drive::Brake => Some(0.0),
-        Drive::Duty(duty) => Some(f64::from(duty.to_q15()) / 32_767.0 * supply_v),
-    }
-}
-
 /// Returns the torque line of a motor that turns at `speed`: electrical torque less friction.
 ///
 /// Coulomb friction is a damping of τ/max(|ω|, ω₀): whole above ω₀, nothing at rest, and never
 /// able to turn a motor back.
-pub fn line(motor: &Motor, voltage: Option<f64>, speed: f64) -> Line {
+pub fn line(motor: &Motor, bridge: Bridge, speed: f64) -> Line {
     let coulomb = motor.coulomb_nm / speed.abs().max(motor.coulomb_speed);
     let mut line = Line {
         torque: 0.0,
         slope: motor.viscous + coulomb,
     };
-    let Some(volts) = voltage else {
-        return line;
-    };
-    let free = (volts - motor.constant * speed) / motor.resistance_ohm;
-    if free.abs() > motor.current_limit_a {
-        line.torque = motor.constant * motor.current_limit_a.copysign(free);
-    } else {
-        line.torque = motor.constant * volts / motor.resistance_ohm;
-        line.slope += motor.constant * motor.constant / motor.resistance_ohm;
+    match bridge {
+        Bridge::Open => {}
+        Bridge::Current(mean) => line.torque = motor.constant * mean,
+        Bridge::Voltage(volts) => {
+            let free = (volts - motor.constant * speed) / motor.resistance_ohm;
+            if free.abs() > motor.current_limit_a {
+                line.torque = motor.constant * motor.current_limit_a.copysign(free);
+            } else {
+                line.torque = motor.constant * volts / motor.resistance_ohm;
+                line.slope += motor.constant * motor.constant / motor.resistance_ohm;
+            }
+        }
     }
     line
 }
 
-/// Returns the current at a speed, within the bridge's limit, A.
-fn current(motor: &Motor, voltage: Option<f64>, speed: f64) -> f64 {
-    let Some(volts) = voltage else {
-        return 0.0;
-    };
+/// Returns the current to which a winding settles at a speed, within the bridge's limit, A.
+fn settled(motor: &Motor, volts: f64, speed: f64) -> f64 {
     let free = (volts - motor.constant * speed) / motor.resistance_ohm;
     free.clamp(-motor.current_limit_a, motor.current_limit_a)
 }
@@ -105,26 +136,24 @@ fn current(motor: &Motor, voltage: Option<f64>, speed: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use eel_units::Duty;
 
     /// Spins a lone motor for a time and returns its speed, rad/s.
-    fn spin(drive: Drive, mut speed: f64, load_nm: f64, seconds: f64) -> (f64, MotorState) {
+    fn spin(bridge: Bridge, mut speed: f64, load_nm: f64, seconds: f64) -> (f64, MotorState) {
         let motor = Motor::default();
         let mut state = MotorState::new(&motor);
         let step = 0.5e-3;
         for _ in 0..(seconds / step) as usize {
-            let volts = voltage(drive, 24.0);
-            let line = line(&motor, volts, speed);
+            let line = line(&motor, bridge, speed);
             let push = line.torque + load_nm - line.slope * speed;
             speed += step * push / (motor.inertia + step * line.slope);
-            state.advance(&motor, volts, speed, step);
+            state.advance(&motor, bridge, speed, step);
         }
         (speed, state)
     }
 
     #[test]
     fn runs_at_the_speed_where_torque_meets_friction() {
-        let (speed, state) = spin(Drive::Duty(Duty::FULL), 0.0, 0.0, 1.0);
+        let (speed, state) = spin(Bridge::Voltage(24.0), 0.0, 0.0, 1.0);
         // k (V − k ω)/R = τc + b ω.
         let expected = (1.488 * 24.0 / 5.8 - 0.06) / (1.488 * 1.488 / 5.8 + 0.02);
         assert!((speed - expected).abs() < 1e-9, "{speed} {expected}");
@@ -135,38 +164,57 @@ mod tests {
     #[test]
     fn a_stalled_bridge_gives_its_limit_and_no_more() {
         let motor = Motor::default();
-        let line = line(&motor, Some(24.0), 0.0);
+        let line = line(&motor, Bridge::Voltage(24.0), 0.0);
         assert!((line.torque - 1.488 * 2.5).abs() < 1e-12);
-        assert!((current(&motor, Some(-24.0), 0.0) + 2.5).abs() < 1e-12);
+        assert!((settled(&motor, -24.0, 0.0) + 2.5).abs() < 1e-12);
     }
 
     #[test]
     fn a_brake_stops_sooner_than_friction() {
-        let (braked, _) = spin(Drive::Brake, 5.0, 0.0, 0.05);
-        let (free, state) = spin(Drive::Off, 5.0, 0.0, 0.05);
+        let (braked, _) = spin(Bridge::Voltage(0.0), 5.0, 0.0, 0.05);
+        let (free, state) = spin(Bridge::Open, 5.0, 0.0, 0.05);
         assert!(braked < 0.01 && free > 1.0, "{braked} {free}");
         assert_eq!(state.current_a, 0.0);
     }
 
     #[test]
     fn coulomb_friction_holds_a_load_below_it() {
-        let (speed, _) = spin(Drive::Off, 0.0, 0.05, 1.0);
+        let (speed, _) = spin(Bridge::Open, 0.0, 0.05, 1.0);
         assert!(speed.abs() < 0.005, "{speed} rad/s");
-        let (speed, _) = spin(Drive::Off, 0.0, 0.10, 3.0);
+        let (speed, _) = spin(Bridge::Open, 0.0, 0.10, 3.0);
         assert!((speed - 2.0).abs() < 1e-6, "{speed} rad/s");
     }
 
     #[test]
     fn a_stalled_motor_warms_towards_its_steady_temperature() {
-        let (_, state) = spin(Drive::Duty(Duty::from_q15(10_000)), 0.0, -50.0, 0.0);
+        let (_, state) = spin(Bridge::Voltage(7.3), 0.0, -50.0, 0.0);
         assert_eq!(state.housing_c, 15.0);
         let motor = Motor::default();
         let mut state = MotorState::new(&motor);
         for _ in 0..100_000 {
-            state.advance(&motor, Some(5.8), 0.0, 0.1);
+            state.advance(&motor, Bridge::Voltage(5.8), 0.0, 0.1);
         }
         // 1 A through 5.8 Ω heats by 5.8 W.
         assert!((state.housing_c - (15.0 + 5.8 * 13.0)).abs() < 1e-3);
         assert!((state.winding_c - state.housing_c - 5.8 * 3.1).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_winding_takes_its_voltage_as_an_exponential() {
+        let motor = Motor::default();
+        let period = 50e-6;
+        let winding = Winding::new(&motor, period);
+        let (volts, speed, mut current, mut exact) = (12.0, 3.0, -1.0, -1.0_f64);
+        for _ in 0..10 {
+            current = winding.advance(&motor, current, volts, speed);
+            // A thousand Euler steps.
+            for _ in 0..1_000 {
+                let push = volts - motor.constant * speed - motor.resistance_ohm * exact;
+                exact += period / 1_000.0 * push / motor.inductance_h;
+            }
+            assert!((current - exact).abs() < 1e-3, "{current} {exact}");
+        }
+        let limited = winding.advance(&motor, 2.5, 60.0, 0.0);
+        assert_eq!(limited, motor.current_limit_a);
     }
 }

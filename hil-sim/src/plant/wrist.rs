@@ -6,7 +6,8 @@ use eel_vertebra::{Drive, Sample};
 use super::algebra::{Mat3, Vec3};
 use super::chain::Load;
 use super::config::{Config, Motor};
-use super::motor::{self, Line, MotorState};
+use super::motor::{self, Bridge, Line, MotorState};
+use super::power::Power;
 use super::random::Random;
 use super::transmission::{Link, Transmission};
 
@@ -21,7 +22,8 @@ pub struct Wrist {
     /// Change of the link's matrix a second, times the joint's rates: rad/s².
     turning: Vec3,
     lines: [Line; 3],
-    voltages: [Option<f64>; 3],
+    bridges: [Bridge; 3],
+    power: Power,
     motors: [MotorState; 3],
     /// Encoder count at a motor angle of zero: where the counter stood at power-up.
     offsets: [i32; 3],
@@ -43,7 +45,8 @@ impl Wrist {
             link,
             turning: Vec3::ZERO,
             lines: [Line::default(); 3],
-            voltages: [None; 3],
+            bridges: [Bridge::Open; 3],
+            power: Power::new(&config.motor),
             motors: std::array::from_fn(|_| MotorState::new(&config.motor)),
             offsets: std::array::from_fn(|_| random.within(1 << 20)),
             random,
@@ -64,10 +67,12 @@ impl Wrist {
         self.follow(rotation, rate, step);
         let speeds = self.link.rates * rate;
         let (mut torques, mut shares) = ([0.0; 3], [0.0; 3]);
+        self.bridges = self
+            .power
+            .act(motor, drives, supply_v, &speeds.0, &mut self.motors, step);
         for i in 0..3 {
-            let voltage = motor::voltage(drives[i], supply_v);
-            let line = motor::line(motor, voltage, speeds.0[i]);
-            (self.voltages[i], self.lines[i]) = (voltage, line);
+            let line = motor::line(motor, self.bridges[i], speeds.0[i]);
+            self.lines[i] = line;
             torques[i] = line.torque - line.slope * speeds.0[i] - motor.inertia * self.turning.0[i];
             shares[i] = motor.inertia + step * line.slope;
         }
@@ -97,7 +102,7 @@ impl Wrist {
         let accelerations = self.link.rates * acceleration + self.turning;
         let torques = std::array::from_fn(|i| {
             let (line, speed) = (self.lines[i], speeds.0[i]);
-            self.motors[i].advance(motor, self.voltages[i], speed, step);
+            self.motors[i].advance(motor, self.bridges[i], speed, step);
             line.torque - line.slope * speed - motor.inertia * accelerations.0[i]
         });
         self.link.rates.transpose_mul(Vec3(torques))
@@ -120,11 +125,10 @@ impl Wrist {
             .unwrap_or(self.link.angles)
     }
 
-    /// Returns the current drawn from the battery, A.
-    pub fn supply_current_a(&self, supply_v: f64) -> f64 {
-        let drawn =
-            |i: usize| self.voltages[i].map_or(0.0, |v| v / supply_v * self.motors[i].current_a);
-        drawn(0) + drawn(1) + drawn(2)
+    /// Returns the mean current drawn from the battery in the last step, A. A shorted or open motor
+    /// draws none.
+    pub fn supply_current_a(&self) -> f64 {
+        self.power.drawn_a()
     }
 
     /// Measures everything, with the quantisation and the noise of the sensors.

@@ -27,7 +27,7 @@ use crate::plant::{Config as PlantConfig, Plant};
 pub use clock::{PLANT_STEP_NS, TICK_NS};
 pub use fault::{Fault, FaultKind};
 pub use link::{Link, SENDING};
-pub use node::{NativeNode, Node, Turn};
+pub use node::{NativeNode, Node, Turn, prototype};
 pub use qemu::QemuNode;
 
 use clock::{Happening, Schedule};

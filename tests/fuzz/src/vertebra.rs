@@ -5,7 +5,7 @@ use eel_canopen::{Frame, NmtState};
 use eel_protocol::{Cob, Counter, HEAD_NODE, Mode, NodeId, State, Target};
 use eel_units::{Angle, Current, Duration, Instant, Temperature, Voltage};
 use eel_vertebra::store::{RamFlash, Store, Stored, serve};
-use eel_vertebra::{Drive, Sample, Settings, Vertebra};
+use eel_vertebra::{Drive, Motor, Sample, Settings, Vertebra};
 
 use crate::draw;
 use crate::flash::Failing;
@@ -13,8 +13,6 @@ use crate::input::Input;
 
 /// The place of the vertebra in the chain.
 const PLACE: u8 = 3;
-/// Full voltage.
-const FULL: i32 = 32_767;
 
 /// A vertebra with its flash, its measurements and the time.
 struct Bench {
@@ -168,8 +166,9 @@ impl Bench {
         let drives = self.vertebra.handle_sample(self.now, &self.sample).drives;
         let state = self.vertebra.state();
         for drive in drives {
-            if let Drive::Duty(duty) = drive {
-                assert!(duty.to_q15().abs() <= FULL, "{duty:?}");
+            if let Drive::Current(setpoint) = drive {
+                let limit = Motor::PROTOTYPE.current_limit;
+                assert!(setpoint.current.abs() <= limit, "{setpoint:?}");
             }
             let may_drive = match state {
                 State::Run
@@ -178,7 +177,9 @@ impl Bench {
                 | State::Motor
                 | State::Damped
                 | State::StopDamped => true,
-                State::Brake | State::StopBrake | State::Fault => !matches!(drive, Drive::Duty(_)),
+                State::Brake | State::StopBrake | State::Fault => {
+                    !matches!(drive, Drive::Current(_))
+                }
                 _ => drive == Drive::Off,
             };
             assert!(may_drive, "{drive:?} in {}", state.name());

@@ -31,7 +31,7 @@ pub struct Watch {
 pub enum Kind {
     Off,
     Brake,
-    Duty,
+    Current,
 }
 
 impl Watch {
@@ -71,7 +71,7 @@ impl Observer for Watch {
         let kinds = turn.actions.drives.map(|drive| match drive {
             Drive::Off => Kind::Off,
             Drive::Brake => Kind::Brake,
-            Drive::Duty(_) => Kind::Duty,
+            Drive::Current(_) => Kind::Current,
         });
         if kinds != self.drives[index].1 {
             self.drives[index] = (now, kinds);

@@ -15,8 +15,8 @@ use eel_canopen::{Abort, Access, Entry};
 pub use served::{ENTRIES, Served, highest, served};
 pub use table::{Field, OBJECTS};
 
-/// The record whose entries are settings.
-const GAINS: u16 = 0x2020;
+/// The records whose entries are settings.
+const SETTINGS: [u16; 2] = [0x2020, 0x2023];
 
 /// How an entry lies on the wire; integers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -270,8 +270,10 @@ pub fn entries() -> impl Iterator<Item = (&'static Object, &'static Sub)> + Clon
 
 /// Returns index and subindex of the entries that are settings: written while nothing moves, and stored.
 pub fn settings() -> impl Iterator<Item = (u16, u8)> + Clone {
-    let highest = highest(GAINS).unwrap_or_default();
-    (1..=highest).map(|subindex| (GAINS, subindex))
+    SETTINGS.into_iter().flat_map(|index| {
+        let highest = highest(index).unwrap_or_default();
+        (1..=highest).map(move |subindex| (index, subindex))
+    })
 }
 
 #[cfg(test)]

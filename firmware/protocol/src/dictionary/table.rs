@@ -149,6 +149,27 @@ const MICROSECONDS: Shape = Shape {
     scale: scale(1, 1_000_000),
     ..raw(DataType::U16, RO, TX)
 };
+const NANOSECONDS: Shape = Shape {
+    unit: "s",
+    scale: scale(1, 1_000_000_000),
+    ..raw(DataType::U16, RO, TX)
+};
+const FRICTION: Shape = Shape {
+    default: 60,
+    max: 1_000,
+    ..thousandths(DataType::U16, RW, NO, "N.m")
+};
+const FRICTION_VISCOUS: Shape = Shape {
+    default: 20,
+    max: 1_000,
+    ..thousandths(DataType::U16, RW, NO, "N.m.s/rad")
+};
+const FRICTION_SPEED: Shape = Shape {
+    default: 50,
+    min: 1,
+    max: 5_000,
+    ..thousandths(DataType::U16, RW, NO, "rad/s")
+};
 const SYNC_PHASE: Shape = Shape {
     data_type: DataType::I16,
     min: -32_768,
@@ -294,8 +315,8 @@ records! {
         1 StiffnessX "stiffness_x" stiffness(400_000), "Stiffness about x, swimming.";
         2 StiffnessY "stiffness_y" stiffness(400_000), "Stiffness about y, diving.";
         3 StiffnessZ "stiffness_z" stiffness(250_000), "Stiffness about z, torsion.";
-        4 DampingX "damping_x" damping(6_000), "Damping about x, swimming.";
-        5 DampingY "damping_y" damping(6_000), "Damping about y, diving.";
+        4 DampingX "damping_x" damping(4_000), "Damping about x, swimming.";
+        5 DampingY "damping_y" damping(4_000), "Damping about y, diving.";
         6 DampingZ "damping_z" damping(3_000), "Damping about z, torsion.";
         7 PeakTorque "peak_torque" PEAK_TORQUE, "Largest torque of each motor.";
         8 RangeYaw "range_yaw" half_range(5_236),
@@ -311,6 +332,15 @@ records! {
         1 Architecture "architecture" ARCHITECTURE,
             "Kind of wrist: 1 parallel axes, 2 orthogonal axes, 3 parallel actuators.";
         2 GeometryScale "scale" SCALE, "Length of the unit mechanism's 1, the rods.";
+    }
+    MOTOR_SETTINGS = 0x2023 "motor_settings",
+        "What the motors are; may be changed while the wrist is off." {
+        1 FrictionCoulomb "friction_coulomb" FRICTION,
+            "Coulomb friction of a crank, that the controller adds along the reference's motion.";
+        2 FrictionViscous "friction_viscous" FRICTION_VISCOUS,
+            "Viscous friction of a crank, that the controller adds along the reference's motion.";
+        3 FrictionSpeed "friction_speed" FRICTION_SPEED,
+            "Speed of a crank from which on its Coulomb friction is added whole.";
     }
     HEALTH = 0x2030 "health", "Supply, temperatures and counters." {
         1 Supply "supply" SUPPLY, "Supply voltage of the bridges.";
@@ -332,6 +362,9 @@ records! {
         2 LoopMax "loop_max" MICROSECONDS, "Longest time that a control tick took since power-up.";
         3 SyncPhase "sync_phase" SYNC_PHASE,
             "Arrival of the last SYNC against the control tick's own grid.";
+        4 CurrentLoopLast "current_loop_last" NANOSECONDS, "Time that the last turn of the current loop took.";
+        5 CurrentLoopMax "current_loop_max" NANOSECONDS,
+            "Longest time that a turn of the current loop took since power-up.";
     }
     SCOPE = 0x2050 "scope", "Captures up to four entries of this dictionary, tick by tick, for 2100:2." {
         1 ScopeChannel1 "channel1" CHANNEL,
@@ -389,11 +422,12 @@ pub(super) const fn position(index: u16) -> Option<usize> {
         0x2013 => 6,
         0x2020 => 7,
         0x2021 => 8,
-        0x2030 => 9,
-        0x2040 => 10,
-        0x2050 => 11,
-        0x2100 => 12,
-        0x2101 => 13,
+        0x2023 => 9,
+        0x2030 => 10,
+        0x2040 => 11,
+        0x2050 => 12,
+        0x2100 => 13,
+        0x2101 => 14,
         _ => return None,
     })
 }

@@ -62,7 +62,10 @@ fn drive() -> impl Strategy<Value = Drive> {
     prop_oneof![
         Just(Drive::Off),
         Just(Drive::Brake),
-        any::<i32>().prop_map(|duty| Drive::Duty(Duty::from_q15(duty))),
+        any::<(i32, i32)>().prop_map(|(current, emf)| Drive::Current(Setpoint {
+            current: Current::from_microamps(current),
+            emf: Voltage::from_millivolts(emf),
+        })),
     ]
 }
 

@@ -9,9 +9,9 @@ use eel_protocol::emergency::EmergencyReport;
 use eel_protocol::{
     Condition, Counter, Effort, HEAD_NODE, LimitCode, Mode, NodeId, PoseReport, State, Target,
 };
-use eel_units::{Angle, Current, Duty, Instant, Temperature, Voltage};
+use eel_units::{Angle, Current, Instant, Temperature, Voltage};
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Drive, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Motor, Sample, Settings, Vertebra, turn};
 
 /// The vertebra under test is the third.
 pub const NODE: u8 = 3;
@@ -273,7 +273,7 @@ impl Bench {
     pub fn is_driven(&self) -> bool {
         self.drives
             .iter()
-            .any(|drive| matches!(drive, Drive::Duty(_)))
+            .any(|drive| matches!(drive, Drive::Current(_)))
     }
 
     /// Tells whether all bridges are off.
@@ -418,10 +418,13 @@ pub fn limits(bench: &Bench) -> [LimitCode; 3] {
         .limit
 }
 
-/// Returns the duty of a drive, if it is one.
-pub fn duty(drive: Drive) -> Option<Duty> {
+/// Returns the torque in N·m that a drive asks of the current loop, if it does.
+pub fn torque(drive: Drive) -> Option<f64> {
     match drive {
-        Drive::Duty(duty) => Some(duty),
+        Drive::Current(setpoint) => {
+            let constant = f64::from(Motor::PROTOTYPE.torque_constant) / 1e6;
+            Some(constant * f64::from(setpoint.current.to_microamps()) / 1e6)
+        }
         Drive::Off | Drive::Brake => None,
     }
 }
