@@ -41,7 +41,7 @@ const SECOND_START: usize = 6_800;
 /// Most instructions that half of the turns may take in which the motors are driven.
 const MEDIAN_BUDGET: u64 = 6_000;
 /// Most instructions of one turn of this script, a turn with a target outside the workspace and garbage.
-const WORST_BUDGET: u64 = 12_000;
+const WORST_BUDGET: u64 = 13_400;
 /// Longest time that QEMU may take.
 const PATIENCE: Duration = Duration::from_secs(60);
 

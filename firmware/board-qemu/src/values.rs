@@ -89,8 +89,6 @@ impl Application for Values {
 
     fn rpdo_applied(&mut self, _number: u8, _cob_id: u16) {}
 
-    fn tpdo_due(&mut self, _number: u8, _cob_id: u16) {}
-
     fn open_domain(&mut self, _index: u16, _subindex: u8) -> Result<u32, Abort> {
         Ok(DOMAIN)
     }

@@ -1,5 +1,7 @@
 //! What a node serves beside its communication area.
 
+use crate::config::Mapped;
+
 /// Why an object can't be read or written: the SDO abort codes of CiA 301, 7.2.4.3.17.
 // As wide as a length, so that a result of either fits two registers; the codes themselves would each take two
 // instructions more.
@@ -149,6 +151,13 @@ pub trait Application {
     /// The abort code to answer with; the object is then unchanged.
     fn write(&mut self, index: u16, subindex: u8, data: &[u8]) -> Result<(), Abort>;
 
+    /// Takes the frame of an RPDO with this mapping as a whole, where it knows how, and tells whether it
+    /// did; else each object is written.
+    fn take_rpdo(&mut self, mapping: &[Mapped], data: &[u8; 8]) -> bool {
+        let _ = (mapping, data);
+        false
+    }
+
     /// Hears that every object mapped to RPDO `number` (1–4) has just been written from a frame
     /// with identifier `cob_id`.
     fn rpdo_applied(&mut self, number: u8, cob_id: u16);
@@ -160,8 +169,12 @@ pub trait Application {
     }
 
     /// Hears that TPDO `number` (1–4) is about to be read and sent as `cob_id`, so that its
-    /// objects can be brought up to date.
-    fn tpdo_due(&mut self, number: u8, cob_id: u16);
+    /// objects can be brought up to date. May return the frame's bytes where it has those of this
+    /// mapping ready; else each object is read.
+    fn tpdo_due(&mut self, number: u8, cob_id: u16, mapping: &[Mapped]) -> Option<[u8; 8]> {
+        let _ = (number, cob_id, mapping);
+        None
+    }
 
     /// Opens a domain to be read from its start and returns its length in bytes. What is then read
     /// does not change until it is opened again.

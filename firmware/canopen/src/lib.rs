@@ -11,7 +11,6 @@
 //! #     fn read(&self, _: u16, _: u8, _: &mut [u8]) -> Result<usize, Abort> { Err(Abort::NoObject) }
 //! #     fn write(&mut self, _: u16, _: u8, _: &[u8]) -> Result<(), Abort> { Err(Abort::NoObject) }
 //! #     fn rpdo_applied(&mut self, _: u8, _: u16) {}
-//! #     fn tpdo_due(&mut self, _: u8, _: u16) {}
 //! # }
 //! # let mut application = Nothing;
 //! # let identity = Identity { vendor: 1, product: 2, revision: 3, serial: 4 };

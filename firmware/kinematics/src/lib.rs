@@ -34,7 +34,7 @@ pub use direct::Direct;
 pub use inverse::Inverse;
 pub use jacobian::Jacobian;
 pub use pose::{Joints, Pose, PoseError};
-pub use reach::{Nearest, Obstacle, Reach};
+pub use reach::{Nearest, Obstacle, Reach, Search};
 pub use rotation::Rotation;
 pub use share::{Bounds, Policy, Shared, Side};
 pub use wrist::Wrist;

@@ -88,7 +88,7 @@ pub struct Nearest {
 }
 
 /// A plane n·x ≥ c, x in Q24 radians, with what it pushes so far.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Plane {
     /// Q14, within ±16.
     normal: Vector,
@@ -121,29 +121,15 @@ impl Wrist {
             }
             Err(obstacle) => obstacle,
         };
-        let range = reach.box_q29();
-        let wanted = to_q29(target);
-        let boxed = [0, 1, 2].map(|axis| wanted[axis].max(-range[axis]).min(range[axis]));
-        let mut pose = self.towards_home(&boxed, reach, COARSE);
-        // The nearest place so far, and what it is on the way home from.
-        let (mut best, mut source) = (distance(&pose, &wanted), boxed);
-        if pose != boxed {
-            for _ in 0..STEPS {
-                let next = self.step(&pose, &wanted, &range, reach.margin.max(LEAST_MARGIN));
-                pose = self.towards_home(&next, reach, COARSE);
-                let length = distance(&pose, &wanted);
-                if length < best {
-                    (best, source) = (length, next);
-                }
-            }
-        }
-        let found = from_q29(self.towards_home(&source, reach, FINE));
-        let inverse = self.inverse(&found)?;
+        let mut search = Search::new(target, reach);
+        while search.advance(self) {}
+        let pose = search.best().unwrap_or_default();
+        let inverse = self.inverse(&pose)?;
         if inverse.margin() < reach.margin {
             return Err(PoseError::Singular);
         }
         Ok(Nearest {
-            pose: found,
+            pose,
             inverse,
             obstacle: Some(obstacle),
         })
@@ -165,8 +151,8 @@ impl Wrist {
         }
     }
 
-    /// Returns the point nearest to `wanted` that all planes at `pose` and the box allow.
-    fn step(&self, pose: &[i32; 3], wanted: &[i32; 3], range: &[i32; 3], margin: i32) -> [i32; 3] {
+    /// Returns the planes that the rooms are at `pose`.
+    fn planes(&self, pose: &[i32; 3], margin: i32) -> [Plane; ROOMS] {
         let here = self.rooms(&from_q29(*pose), margin);
         let mut planes = [Plane::default(); ROOMS];
         for axis in 0..3 {
@@ -194,26 +180,195 @@ impl Wrist {
                 plane.inverse = quotient_q30(1 << 14, norm);
             }
         }
-        project(&mut planes, wanted, range)
+        planes
+    }
+}
+
+/// The way home from a pose, halved until the place is known where it becomes allowed.
+#[derive(Clone, Copy, Debug)]
+struct Homing {
+    from: Vector,
+    halvings: u32,
+    left: u32,
+    /// Parts of the way in 2⁻ʰ: `good` is allowed.
+    good: i32,
+    bad: i32,
+    has_begun: bool,
+}
+
+impl Homing {
+    const fn new(from: Vector, halvings: u32) -> Self {
+        Self {
+            from,
+            halvings,
+            left: halvings,
+            good: 0,
+            bad: 1 << (halvings & 31),
+            has_begun: false,
+        }
     }
 
-    /// Returns the pose, or where on the way home it becomes an allowed one, to 2⁻ʰ of the way.
-    fn towards_home(&self, pose: &[i32; 3], reach: &Reach, halvings: u32) -> [i32; 3] {
-        if self.allowed(&from_q29(*pose), reach).is_ok() {
-            return *pose;
-        }
-        // Parts of the way in 2⁻ʰ: `good` is allowed.
-        let (mut good, mut bad) = (0, 1 << (halvings & 31));
-        let part = |share: i32| pose.map(|angle| (wide(angle, share) >> (halvings & 31)) as i32);
-        for _ in 0..halvings {
-            let middle = (good + bad) >> 1;
-            if self.allowed(&from_q29(part(middle)), reach).is_ok() {
-                good = middle;
-            } else {
-                bad = middle;
+    fn part(&self, share: i32) -> Vector {
+        self.from
+            .map(|angle| (wide(angle, share) >> (self.halvings & 31)) as i32)
+    }
+
+    /// Looks at some places; returns the pose itself or where it becomes allowed, when it is done.
+    fn advance(&mut self, wrist: &Wrist, reach: &Reach, places: u32) -> Option<Vector> {
+        for _ in 0..places {
+            if !self.has_begun {
+                self.has_begun = true;
+                if wrist.allowed(&from_q29(self.from), reach).is_ok() {
+                    return Some(self.from);
+                }
+            } else if self.left > 0 {
+                self.left -= 1;
+                let middle = (self.good + self.bad) >> 1;
+                let is_good = wrist.allowed(&from_q29(self.part(middle)), reach).is_ok();
+                let end = if is_good {
+                    &mut self.good
+                } else {
+                    &mut self.bad
+                };
+                *end = middle;
+            }
+            if self.left == 0 {
+                return Some(self.part(self.good));
             }
         }
-        part(good)
+        None
+    }
+}
+
+/// What a search does next.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is no heap to put the planes on"
+)]
+#[derive(Clone, Copy, Debug)]
+enum Stage {
+    /// From the target, or a point of the planes, towards home.
+    Homing(Homing),
+    /// Makes planes at the pose.
+    Planes,
+    /// Finds the point of the planes.
+    Projecting(Projection),
+    /// Finds exactly where the best way home becomes allowed.
+    Ending(Homing),
+    Ended,
+}
+
+/// The search for the reachable pose that is nearest to a target, piece by piece: each
+/// [`Search::advance`] takes at most as long as five inverse kinematics.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    reach: Reach,
+    wanted: Vector,
+    pose: Vector,
+    /// The nearest place so far with its distance, and what it is on the way home from.
+    best: Option<(i64, Vector)>,
+    source: Vector,
+    stage: Stage,
+    steps: usize,
+}
+
+impl Search {
+    /// Places that a piece looks at, and sweeps that it does.
+    const PLACES: u32 = 4;
+    const SWEEPS: usize = 6;
+
+    /// Starts for a target that is not allowed.
+    pub fn new(target: &Pose, reach: &Reach) -> Self {
+        let wanted = to_q29(target);
+        let range = reach.box_q29();
+        let boxed = [0, 1, 2].map(|axis| wanted[axis].max(-range[axis]).min(range[axis]));
+        Self {
+            reach: *reach,
+            wanted,
+            pose: boxed,
+            best: None,
+            source: boxed,
+            stage: Stage::Homing(Homing::new(boxed, COARSE)),
+            steps: 0,
+        }
+    }
+
+    /// Starts for another target where the search for the one before has come.
+    pub fn retarget(&mut self, target: &Pose) {
+        let Some((_, pose)) = self.best else {
+            *self = Self::new(target, &self.reach);
+            return;
+        };
+        let wanted = to_q29(target);
+        *self = Self {
+            wanted,
+            pose,
+            best: Some((distance(&pose, &wanted), pose)),
+            source: pose,
+            stage: Stage::Planes,
+            steps: 0,
+            ..*self
+        };
+    }
+
+    /// Returns the target.
+    pub fn target(&self) -> Pose {
+        from_q29(self.wanted)
+    }
+
+    /// Returns the nearest allowed pose so far; home where only that is.
+    pub fn best(&self) -> Option<Pose> {
+        self.best.map(|(_, pose)| from_q29(pose))
+    }
+
+    /// Does a piece of the search. Tells whether there is more to do.
+    pub fn advance(&mut self, wrist: &Wrist) -> bool {
+        match &mut self.stage {
+            Stage::Homing(homing) => {
+                let source = homing.from;
+                if let Some(pose) = homing.advance(wrist, &self.reach, Self::PLACES) {
+                    self.arrive(pose, source);
+                }
+            }
+            Stage::Planes => {
+                let margin = self.reach.margin.max(LEAST_MARGIN);
+                let planes = wrist.planes(&self.pose, margin);
+                let range = self.reach.box_q29();
+                self.stage = Stage::Projecting(Projection::new(planes, &self.wanted, &range));
+            }
+            Stage::Projecting(projection) => {
+                if let Some(next) = projection.advance(Self::SWEEPS) {
+                    self.stage = Stage::Homing(Homing::new(next, COARSE));
+                }
+            }
+            Stage::Ending(homing) => {
+                if let Some(pose) = homing.advance(wrist, &self.reach, Self::PLACES) {
+                    self.best = Some((distance(&pose, &self.wanted), pose));
+                    self.stage = Stage::Ended;
+                }
+            }
+            Stage::Ended => {}
+        }
+        !matches!(self.stage, Stage::Ended)
+    }
+
+    /// Takes an allowed pose and goes on from there, or ends.
+    fn arrive(&mut self, pose: Vector, source: Vector) {
+        let is_first = self.best.is_none();
+        let length = distance(&pose, &self.wanted);
+        if self.best.is_none_or(|(least, _)| length < least) {
+            self.best = Some((length, pose));
+            self.source = source;
+        }
+        self.pose = pose;
+        self.steps += usize::from(!is_first);
+        // A box that is allowed itself has no nearer place.
+        let is_box = is_first && pose == source;
+        self.stage = if is_box || self.steps == STEPS {
+            Stage::Ending(Homing::new(self.source, FINE))
+        } else {
+            Stage::Planes
+        };
     }
 }
 
@@ -242,20 +397,50 @@ fn distance(one: &Vector, other: &Vector) -> i64 {
 }
 
 /// Hildreth's iteration: the point nearest to `wanted` on the positive side of every plane and in the
-/// box; angles in Q29.
-fn project(planes: &mut [Plane; ROOMS], wanted: &Vector, range: &Vector) -> Vector {
-    let range = range.map(|angle| angle >> 5);
-    let mut point = wanted.map(|angle| angle >> 5);
-    let mut held = [0; 3];
-    for _ in 0..SWEEPS {
+/// box.
+#[derive(Clone, Copy, Debug)]
+struct Projection {
+    planes: [Plane; ROOMS],
+    /// Q24, as all of these.
+    point: Vector,
+    held: Vector,
+    range: Vector,
+    sweeps: usize,
+}
+
+impl Projection {
+    /// Starts at `wanted`; angles in Q29.
+    fn new(planes: [Plane; ROOMS], wanted: &Vector, range: &Vector) -> Self {
+        Self {
+            planes,
+            point: wanted.map(|angle| angle >> 5),
+            held: [0; 3],
+            range: range.map(|angle| angle >> 5),
+            sweeps: SWEEPS,
+        }
+    }
+
+    /// Goes through all planes some times; returns the point, Q29, when it is done.
+    fn advance(&mut self, sweeps: usize) -> Option<Vector> {
+        for _ in 0..sweeps.min(self.sweeps) {
+            self.sweep();
+        }
+        self.sweeps = self.sweeps.saturating_sub(sweeps);
+        let (point, range) = (&self.point, &self.range);
+        (self.sweeps == 0)
+            .then(|| [0, 1, 2].map(|axis| point[axis].max(-range[axis]).min(range[axis]) << 5))
+    }
+
+    fn sweep(&mut self) {
+        let (point, held, range) = (&mut self.point, &mut self.held, &self.range);
         for axis in 0..3 {
             let free = point[axis] - held[axis];
             point[axis] = free.max(-range[axis]).min(range[axis]);
             held[axis] = point[axis] - free;
         }
-        for plane in planes.iter_mut() {
+        for plane in &mut self.planes {
             // What is missing, Q38 to Q24.
-            let missing = saturate((plane.least - dot(&plane.normal, &point)) >> 14);
+            let missing = saturate((plane.least - dot(&plane.normal, point)) >> 14);
             if missing < 0 && plane.push == 0 {
                 continue;
             }
@@ -269,5 +454,4 @@ fn project(planes: &mut [Plane; ROOMS], wanted: &Vector, range: &Vector) -> Vect
             }
         }
     }
-    [0, 1, 2].map(|axis| point[axis].max(-range[axis]).min(range[axis]) << 5)
 }

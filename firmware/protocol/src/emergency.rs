@@ -98,6 +98,9 @@ catalogue! {
     MOTOR_OVER_TEMPERATURE = 0x4310 "motor-over-temperature" Fault
         REGISTER_GENERIC | REGISTER_TEMPERATURE, "temperature in 0.1 degC",
         "A motor's housing is hotter than it may be: let it cool, and check its load and its sensor.";
+    WINDING_OVER_TEMPERATURE = 0x4320 "winding-over-temperature" Fault
+        REGISTER_GENERIC | REGISTER_TEMPERATURE, "temperature in 0.1 degC",
+        "A motor's winding is hotter than its current limit can explain: check its load, water and current sensor.";
     SETTINGS_INVALID = 0x6320 "settings-invalid" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER, "",
         "The stored settings are damaged or contradict each other: write them again and store them.";
     ENCODER_IMPLAUSIBLE = 0x7300 "encoder-implausible" Fault
@@ -268,6 +271,7 @@ mod tests {
             (0x3220, "under-voltage"),
             (0x4210, "board-over-temperature"),
             (0x4310, "motor-over-temperature"),
+            (0x4320, "winding-over-temperature"),
             (0x6320, "settings-invalid"),
             (0x7300, "encoder-implausible"),
             (0x7320, "encoder-invalid"),

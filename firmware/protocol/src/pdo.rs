@@ -39,7 +39,8 @@ const fn mapped<const N: usize>(direction: Pdo, pairs: [(u16, u8); N]) -> [Mappe
     mapping
 }
 
-const TARGET: &[Mapped] = &mapped(
+/// What RPDO1 carries where it is not mapped otherwise.
+pub const TARGET: &[Mapped] = &mapped(
     Pdo::Receive,
     [
         (0x2000, 1),
@@ -53,7 +54,8 @@ const MOMENT: &[Mapped] = &mapped(
     Pdo::Receive,
     [(0x2001, 1), (0x2001, 2), (0x2001, 3), (0x2001, 4)],
 );
-const POSE: &[Mapped] = &mapped(
+/// What TPDO1 carries where it is not mapped otherwise.
+pub const POSE: &[Mapped] = &mapped(
     Pdo::Transmit,
     [
         (0x2010, 1),
@@ -63,7 +65,8 @@ const POSE: &[Mapped] = &mapped(
         (0x2010, 5),
     ],
 );
-const EFFORT: &[Mapped] = &mapped(
+/// What TPDO2 carries where it is not mapped otherwise.
+pub const EFFORT: &[Mapped] = &mapped(
     Pdo::Transmit,
     [(0x2011, 1), (0x2011, 2), (0x2011, 3), (0x2011, 4)],
 );

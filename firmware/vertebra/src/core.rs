@@ -5,7 +5,7 @@ use eel_kinematics::{Joints, Policy, Pose, PoseError, Side};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
-use eel_units::{Angle, AngularVelocity, Instant, Torque};
+use eel_units::{Angle, AngularVelocity, Current, Instant, Torque, saturate};
 
 use crate::command::{CommandStream, TARGET_TIMEOUT};
 use crate::current::Electrical;
@@ -15,13 +15,14 @@ use crate::freezing::Clock;
 use crate::friction::Compensation;
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
-use crate::limits::{MotorBounds, Situation, bounds};
+use crate::limits::{MotorBounds, Situation, Standing, bounds};
 use crate::machine::Machine;
 use crate::objects::{Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
 use crate::settings::Settings;
 use crate::spline::{Reference, Spline};
-use crate::workspace::Limited;
+use crate::thermal::Thermal;
+use crate::workspace::{Guide, Limited};
 
 /// Conditions that are told as warnings while they hold.
 const WARNINGS: [Condition; 3] = [
@@ -39,8 +40,17 @@ pub(crate) struct Core {
     pub friction: Compensation,
     /// What it takes of each motor now.
     pub friction_torques: [Torque; 3],
-    /// Ticks since power-up, to spread over them what need not be done in each.
-    pub ticks: u8,
+    /// Where the reference had the motors, and when.
+    pub led: Option<(Joints, Instant)>,
+    /// How warm each motor is inside; outlives a reset of the node.
+    pub thermal: [Thermal; 3],
+    pub standing: [Standing; 3],
+    /// Which windings are hotter than their currents should let them become.
+    pub is_too_hot: [bool; 3],
+    /// Which bridges were off since the last tick.
+    pub is_open: [bool; 3],
+    /// What the tick does besides, of what need not be done in each.
+    pub turn: u8,
     pub now: Instant,
     pub operational: bool,
     pub encoders: [Encoder; 3],
@@ -60,6 +70,9 @@ pub(crate) struct Core {
     pub motor_torque: [Torque; 3],
     pub status: Status,
     pub limited: Limited,
+    pub guide: Guide,
+    /// Whether a pose was admitted since the last tick.
+    pub has_followed: bool,
     pub warned: bool,
     pub over_current_ticks: [u8; 3],
     pub lost_ticks: u8,
@@ -95,7 +108,12 @@ impl Core {
             electrical: Electrical::new(&settings.motor),
             friction: Compensation::new(&settings.motor.friction),
             friction_torques: [Torque::ZERO; 3],
-            ticks: 0,
+            led: None,
+            thermal: [Thermal::new(); 3],
+            standing: [Standing::NONE; 3],
+            is_too_hot: [false; 3],
+            is_open: [true; 3],
+            turn: 0,
             now,
             operational: false,
             encoders: [encoder; 3],
@@ -112,6 +130,8 @@ impl Core {
             motor_torque: [Torque::ZERO; 3],
             status: Status::NONE,
             limited: Limited::default(),
+            guide: Guide::default(),
+            has_followed: false,
             warned: false,
             over_current_ticks: [0; 3],
             lost_ticks: 0,
@@ -155,10 +175,18 @@ impl Core {
     pub fn tick(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
         self.now = now;
         self.sample = Some(*sample);
-        self.ticks = self.ticks.wrapping_add(1);
+        let motors = self.thermal.iter_mut().zip(sample.current);
+        for ((thermal, current), is_open) in motors.zip(self.is_open) {
+            // What the sensor of an open bridge reads is no current.
+            thermal.take(if is_open { Current::ZERO } else { current });
+        }
+        if !self.has_followed {
+            self.take_turn(sample);
+        }
         let motion = self.estimate(sample);
         self.watch(sample);
         self.bridge_missing_targets();
+        self.search_on();
         if now.since(self.feed_since) >= TARGET_TIMEOUT {
             self.forget_feed_forward();
         }
@@ -168,6 +196,7 @@ impl Core {
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
         let drives = self.drive(motion.as_ref(), sample);
+        self.is_open = drives.map(|drive| drive == Drive::Off);
         self.forget_warnings();
         self.report();
         self.end_warnings();
@@ -200,7 +229,9 @@ impl Core {
                 Ok(motion) => {
                     let motion = found.insert(motion);
                     self.pose = motion.direct.rotation.to_pose();
-                    self.find_residual();
+                    if !self.has_followed {
+                        self.find_residual();
+                    }
                 }
                 Err(error) if self.machine.is_live() => {
                     let emergency = match error {
@@ -295,13 +326,14 @@ impl Core {
         };
         if self.machine.state() != State::Run {
             self.friction_torques = [Torque::ZERO; 3];
+            self.led = None;
         }
         let moment = match self.machine.state() {
             State::Run => {
                 let (elapsed, period) = self.stream.place(self.now);
                 let reference = self.spline.reference(elapsed, period);
                 let omega = reference.pose.angular_velocity(reference.rates);
-                self.compensate(motion, omega);
+                self.compensate(&reference.pose);
                 self.pull(motion, reference, omega)
             }
             State::Hold => {
@@ -316,12 +348,27 @@ impl Core {
         self.share(motion, moment, &bounds)
     }
 
-    /// Takes the friction of the motors, which the reference turns with `omega`, every fourth tick.
-    fn compensate(&mut self, motion: &Motion, omega: [AngularVelocity; 3]) {
-        if self.ticks & 3 == 0 {
-            let speeds = motion.direct.jacobian.motor_rates(omega);
-            self.friction_torques = speeds.map(|speed| self.friction.torque(speed));
+    /// Takes the friction of the motors as the reference turns them, every fourth tick but those of a
+    /// target. Their speed is that of the motors' angles since the last time.
+    fn compensate(&mut self, reference: &Pose) {
+        if self.turn & 3 != 0 || self.has_followed {
+            return;
         }
+        let found = self.settings.wrist.inverse(reference).ok();
+        let before = self.led;
+        self.led = found.map(|inverse| (inverse.joints, self.now));
+        let (Some((Joints(now), _)), Some((Joints(before), then))) = (self.led, before) else {
+            return;
+        };
+        // Q29 rad in µs; Q24 rad/s.
+        let passed = self.now.since(then).to_micros().max(1);
+        let factor = i64::from(1_000_000 / passed);
+        let [a, b, c] = now;
+        let [x, y, z] = before;
+        self.friction_torques = [a - x, b - y, c - z].map(|turned| {
+            let speed = saturate((i64::from(turned.to_q29()) * factor) >> 5);
+            self.friction.torque(AngularVelocity::from_q24(speed))
+        });
     }
 
     /// Returns the moment towards a reference, and remembers how far off the wrist is.
@@ -369,6 +416,7 @@ impl Core {
     pub fn bounds(&self, command_cap: Option<Torque>, sample: &Sample) -> [MotorBounds; 3] {
         let situation = Situation {
             sample,
+            standing: &self.standing,
             angles: self.angles(),
             speeds: self.speeds(),
             command_cap,

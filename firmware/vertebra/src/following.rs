@@ -10,7 +10,7 @@ use crate::core::Core;
 use crate::machine::Outcome;
 use crate::settings::Settings;
 use crate::spline::Spline;
-use crate::workspace::{Limited, admit};
+use crate::workspace::{Guide, Limited};
 
 /// Conditions that a fault reset can't clear because the reset itself, or time, does.
 const CLEARED_BY_RESET: [Condition; 4] = [
@@ -67,12 +67,22 @@ impl Core {
         }
     }
 
+    /// Searches on for the poses that are nearest to targets out of reach, in the ticks between them.
+    pub fn search_on(&mut self) {
+        // Nor in those that have something else to do.
+        let is_busy = self.turn & 3 == 0 || self.turn < 4;
+        if !core::mem::take(&mut self.has_followed) && !is_busy {
+            self.guide.advance(&self.settings.wrist);
+        }
+    }
+
     /// Admits a pose and makes it the end of the next segment.
     fn follow(&mut self, wanted: Pose) -> Limited {
         let (_, period) = self.stream.place(self.now);
         let previous = self.spline.newest();
         let Settings { limits, wrist, .. } = &self.settings;
-        let (pose, limited) = admit(wanted, previous, period, limits, wrist);
+        let (pose, limited) = self.guide.admit(wanted, previous, period, limits, wrist);
+        self.has_followed = true;
         self.spline.push(pose);
         limited
     }
@@ -135,7 +145,10 @@ impl Core {
             self.forget_feed_forward();
             self.motor_torque = [Torque::ZERO; 3];
             match after {
-                State::Run => self.spline = Spline::at_rest(self.pose),
+                State::Run => {
+                    self.spline = Spline::at_rest(self.pose);
+                    self.guide = Guide::default();
+                }
                 State::Hold => self.hold = self.pose,
                 _ => {}
             }

@@ -38,6 +38,7 @@ mod settings;
 mod spline;
 pub mod store;
 mod storing;
+mod thermal;
 mod vertebra;
 mod workspace;
 
@@ -47,5 +48,5 @@ pub use eel_canopen::Identifiers;
 pub use events::Event;
 pub use io::{Actions, Drive, Sample, Setpoint};
 pub use machine::{STOP_BRAKE, STOP_DAMPED};
-pub use settings::{Gains, Limits, Motor, Ramp, Settings, Travel};
+pub use settings::{Friction, Gains, Limits, Motor, Ramp, Settings, ThermalData, Travel};
 pub use vertebra::{Vertebra, turn};

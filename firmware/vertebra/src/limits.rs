@@ -12,6 +12,8 @@ use crate::settings::{Limits, Ramp, Travel};
 const TRAVEL_RAMP: Angle = Angle::from_milliradians(50);
 /// One in Q15.
 const ONE: i64 = 1 << 15;
+/// Share of the peak torque that what is hot still may brake with, Q15: a quarter.
+const BRAKING_FLOOR: i64 = ONE / 4;
 
 /// The bounds of one motor, each with its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +56,20 @@ impl MotorBounds {
         }
     }
 
+    /// Lowers the bound of what drives: torque along the speed, and both ways at rest.
+    fn cap_driving(&mut self, cap: Torque, speed: AngularVelocity, code: LimitCode) {
+        let Bounds { low, high } = self.torque;
+        self.cap_high(eased(cap, high, backward(speed)), code);
+        self.cap_low(-eased(cap, -low, backward(-speed)), code);
+    }
+
+    /// Lowers the bound of what brakes: torque against the speed, not at rest.
+    fn cap_braking(&mut self, cap: Torque, speed: AngularVelocity, code: LimitCode) {
+        let Bounds { low, high } = self.torque;
+        self.cap_high(eased(cap, high, ONE - backward(speed)), code);
+        self.cap_low(-eased(cap, -low, ONE - backward(-speed)), code);
+    }
+
     fn cap_both(&mut self, bound: Torque, code: LimitCode) {
         self.cap_high(bound, code);
         self.cap_low(-bound, code);
@@ -69,11 +85,53 @@ impl MotorBounds {
     }
 }
 
+/// What bounds a motor and changes slowly: the peak, and the temperatures of board, housing and winding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Standing {
+    driving: Torque,
+    /// What brakes is never taken away whole.
+    braking: Torque,
+    code: LimitCode,
+}
+
+impl Standing {
+    /// Nothing, until it is known.
+    pub const NONE: Self = Self {
+        driving: Torque::ZERO,
+        braking: Torque::ZERO,
+        code: LimitCode::Off,
+    };
+
+    /// Returns the bounds of a motor whose housing is so warm and whose winding allows a torque.
+    pub fn new(limits: &Limits, board: Temperature, housing: Temperature, winding: Torque) -> Self {
+        let peak = limits.peak_torque.abs();
+        let derate = |ramp, value| scaled(peak, ONE - share(ramp, value));
+        let mut least = (peak, LimitCode::Peak);
+        for (bound, code) in [
+            (derate(limits.board_hot, board), LimitCode::Board),
+            (derate(limits.motor_hot, housing), LimitCode::Thermal),
+            (winding, LimitCode::Thermal),
+        ] {
+            if bound < least.0 {
+                least = (bound, code);
+            }
+        }
+        let (driving, code) = least;
+        Self {
+            driving,
+            braking: driving.max(scaled(peak, BRAKING_FLOOR)),
+            code,
+        }
+    }
+}
+
 /// What the bounds of all motors follow from.
 #[derive(Clone, Copy, Debug)]
 pub struct Situation<'a> {
     /// What was measured.
     pub sample: &'a Sample,
+    /// What changes slowly.
+    pub standing: &'a [Standing; 3],
     /// Angle of each motor.
     pub angles: [Angle; 3],
     /// Speed of each motor.
@@ -84,24 +142,28 @@ pub struct Situation<'a> {
 
 /// Returns what each motor may produce.
 pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [MotorBounds; 3] {
-    let sample = now.sample;
-    let supply = sample.supply;
+    let supply = now.sample.supply;
     let low = falling(limits.supply_low.end, limits.supply_low.start, supply);
     let high = ONE - falling(limits.supply_high.start, limits.supply_high.end, supply);
-    let board = ONE - share(limits.board_hot, sample.board_temperature);
     core::array::from_fn(|index| {
-        let mut bounds = MotorBounds::symmetric(limits.peak_torque, LimitCode::Peak);
+        let standing = now.standing.get(index).unwrap_or(&Standing::NONE);
+        let speed = now.speeds.get(index).copied().unwrap_or_default();
+        let mut bounds = MotorBounds::symmetric(standing.braking, standing.code);
+        if standing.driving < standing.braking {
+            bounds.cap_driving(standing.driving, speed, standing.code);
+        }
         if let Some(cap) = now.command_cap {
             bounds.cap_both(cap.abs(), LimitCode::Command);
         }
-        let derate = |share: i64| scaled(limits.peak_torque, share);
-        bounds.cap_both(derate(low), LimitCode::Undervoltage);
-        bounds.cap_both(derate(high), LimitCode::Overvoltage);
-        bounds.cap_both(derate(board), LimitCode::Board);
-        let at = |values: &[Temperature; 3]| values.get(index).copied().unwrap_or_default();
-        let hot = ONE - share(limits.motor_hot, at(&sample.motor_temperature));
-        bounds.cap_both(derate(hot), LimitCode::Thermal);
-        let speed = now.speeds.get(index).copied().unwrap_or_default();
+        // A supply that is too low is drawn from by what drives; one too high is fed by what brakes.
+        if low < ONE {
+            let cap = scaled(limits.peak_torque, low);
+            bounds.cap_driving(cap, speed, LimitCode::Undervoltage);
+        }
+        if high < ONE {
+            let cap = scaled(limits.peak_torque, high);
+            bounds.cap_braking(cap, speed, LimitCode::Overvoltage);
+        }
         let (reach_low, reach_high) = motor.reach(supply, speed);
         bounds.cap_low(reach_low, LimitCode::Speed);
         bounds.cap_high(reach_high, LimitCode::Speed);
@@ -111,6 +173,17 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
         }
         bounds
     })
+}
+
+/// Returns how far a motor that turns at `speed` brakes with positive torque, Q15: whole from 0.25 rad/s
+/// backward, not at all at rest and forward, so that no bound jumps.
+fn backward(speed: AngularVelocity) -> i64 {
+    i64::from(speed.to_q24().saturating_neg() >> 7).clamp(0, ONE)
+}
+
+/// Returns the cap that is `cap` at a share of nothing and `whole` at a whole one, Q15.
+fn eased(cap: Torque, whole: Torque, share: i64) -> Torque {
+    cap + scaled(whole - cap, share)
 }
 
 /// Takes away the torque that leads out of the travel, within a ramp before its end.
@@ -152,6 +225,13 @@ fn share(ramp: Ramp<Temperature>, value: Temperature) -> i64 {
 fn fraction(from: i32, to: i32, value: i32) -> i64 {
     let span = (i64::from(to) - i64::from(from)).max(1);
     let part = (i64::from(value) - i64::from(from)).clamp(0, span);
+    // Nearly always it is at an end, where nothing has to be divided.
+    if part == 0 {
+        return 0;
+    }
+    if part == span {
+        return ONE;
+    }
     // The machine divides 32 bits itself, and no ramp is longer.
     match u16::try_from(span) {
         Ok(span) => i64::from(((part as u32) << 15) / u32::from(span).max(1)),

@@ -43,6 +43,21 @@ pub(crate) struct Timing {
 }
 
 impl ReceivedTarget {
+    /// Takes a frame's bytes.
+    pub const fn from_bytes(bytes: [u8; 8]) -> Self {
+        let [y0, y1, p0, p1, r0, r1, code, crc] = bytes;
+        let [yaw, pitch, roll] = [[y0, y1], [p0, p1], [r0, r1]];
+        Self {
+            angles: [
+                i16::from_le_bytes(yaw),
+                i16::from_le_bytes(pitch),
+                i16::from_le_bytes(roll),
+            ],
+            code,
+            crc,
+        }
+    }
+
     /// Returns the frame's bytes.
     pub fn to_bytes(self) -> [u8; 8] {
         let [y, p, r] = self.angles.map(i16::to_le_bytes);
@@ -120,7 +135,13 @@ impl Core {
             | Field::RateLimit
             | Field::FrictionCoulomb
             | Field::FrictionViscous
-            | Field::FrictionSpeed => self.settings.value(field).unwrap_or_default(),
+            | Field::FrictionSpeed
+            | Field::WindingResistance
+            | Field::HousingResistance
+            | Field::WindingCapacity
+            | Field::HousingCapacity
+            | Field::WindingLimit
+            | Field::Ambient => self.settings.value(field).unwrap_or_default(),
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
             Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
@@ -132,6 +153,9 @@ impl Core {
             Field::LostTargets => i64::from(self.stream.counters().lost),
             Field::ReceiveOverruns => i64::from(self.counters.receive_overruns),
             Field::TransmitOverruns => i64::from(self.counters.transmit_overruns),
+            Field::WindingTemperature1 => i64::from(tenths(self.thermal[0].winding())),
+            Field::WindingTemperature2 => i64::from(tenths(self.thermal[1].winding())),
+            Field::WindingTemperature3 => i64::from(tenths(self.thermal[2].winding())),
             Field::LoopLast => i64::from(self.timing.loop_last.to_micros()),
             Field::LoopMax => i64::from(self.timing.loop_max.to_micros()),
             Field::SyncPhase => self.timing.sync_phase_us,

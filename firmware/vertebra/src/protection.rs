@@ -9,7 +9,10 @@ use crate::command::TARGET_TIMEOUT;
 use crate::core::Core;
 use crate::encoder::Encoder;
 use crate::io::{Drive, Sample};
+use crate::limits::Standing;
 use crate::machine::STOP_DAMPED;
+use crate::settings::Settings;
+use crate::thermal::{FAULT_MARGIN, Thermal};
 use crate::workspace::is_believable;
 
 /// Ticks for which a current may be above its hard limit.
@@ -43,6 +46,28 @@ impl Core {
             .with(Condition::Latched, self.machine.state().is_latched());
     }
 
+    /// Does what need not be done in each tick, a part in each but those that a target makes long
+    /// already: brings one motor's temperature and what follows from it up to date.
+    pub fn take_turn(&mut self, sample: &Sample) {
+        self.turn = self.turn.wrapping_add(1) & 31;
+        let Some(motor) = usize::from(self.turn).checked_sub(1) else {
+            return;
+        };
+        let (Some(thermal), Some(standing), Some(is_too_hot), Some(housing)) = (
+            self.thermal.get_mut(motor),
+            self.standing.get_mut(motor),
+            self.is_too_hot.get_mut(motor),
+            sample.motor_temperature.get(motor),
+        ) else {
+            return;
+        };
+        let Settings { limits, motor, .. } = &self.settings;
+        thermal.advance(self.now, motor, *housing);
+        *is_too_hot = thermal.winding() >= motor.thermal.winding_limit + FAULT_MARGIN;
+        let torque = self.electrical.torque(thermal.bound(motor));
+        *standing = Standing::new(limits, sample.board_temperature, *housing, torque);
+    }
+
     /// Notes what stands against enabling.
     fn note_refusals(&mut self, sample: &Sample) {
         let limits = &self.settings.limits;
@@ -53,6 +78,7 @@ impl Core {
                 .motor_temperature
                 .iter()
                 .any(|value| *value >= limits.motor_hot.end);
+        let hot = hot || self.hot_winding().is_some();
         let voltage =
             sample.supply <= limits.supply_low.end || sample.supply >= limits.supply_high.end;
         self.status = self
@@ -104,7 +130,18 @@ impl Core {
                     .fault(Emergency::MOTOR_OVER_TEMPERATURE, Some(motor), detail);
             }
         }
+        if let Some(motor) = self.hot_winding() {
+            let winding = self.thermal.get(motor).map(Thermal::winding);
+            let detail = decidegrees(winding.unwrap_or_default());
+            let fault = Emergency::WINDING_OVER_TEMPERATURE;
+            self.pending.fault(fault, Some(motor), detail);
+        }
         self.find_over_current(sample);
+    }
+
+    /// Returns the first motor whose winding is hotter than its current should let it become.
+    fn hot_winding(&self) -> Option<usize> {
+        self.is_too_hot.iter().position(|hot| *hot)
     }
 
     /// Finds a current that stays far above what the bridge is told never to exceed.

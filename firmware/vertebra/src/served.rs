@@ -1,11 +1,12 @@
 //! The object dictionary as the node serves it: the core's fields, the scope's, and what streams.
 
-use eel_canopen::{Abort, Access, Application, Entry};
-use eel_protocol::PoseReport;
+use eel_canopen::{Abort, Access, Application, Entry, Mapped};
 use eel_protocol::dictionary::{self, Field};
 use eel_protocol::scope::captured;
+use eel_protocol::{PoseReport, pdo};
 
 use crate::core::Core;
+use crate::objects::ReceivedTarget;
 use crate::records::Records;
 
 /// The electronic data sheet, and its format: plain text.
@@ -145,6 +146,15 @@ impl Application for Served<'_> {
         self.set(entry.field, entry.accept(data)?)
     }
 
+    fn take_rpdo(&mut self, mapping: &[Mapped], data: &[u8; 8]) -> bool {
+        // Any bytes are a target.
+        let is_target = mapping == pdo::TARGET;
+        if is_target {
+            self.core.target = ReceivedTarget::from_bytes(*data);
+        }
+        is_target
+    }
+
     fn rpdo_applied(&mut self, number: u8, cob_id: u16) {
         match number {
             // It waits for SYNC even where RPDO1 is event-driven: the path is made of one target for each.
@@ -161,7 +171,7 @@ impl Application for Served<'_> {
         }
     }
 
-    fn tpdo_due(&mut self, number: u8, cob_id: u16) {
+    fn tpdo_due(&mut self, number: u8, cob_id: u16, mapping: &[Mapped]) -> Option<[u8; 8]> {
         let core = &mut *self.core;
         if number == 1 {
             let report = PoseReport {
@@ -173,6 +183,13 @@ impl Application for Served<'_> {
             };
             core.pose_counter = core.pose_counter.next();
             core.pose_bytes = report.to_bytes(cob_id);
+        }
+        if mapping == pdo::POSE {
+            Some(core.pose_bytes)
+        } else if mapping == pdo::EFFORT {
+            Some(core.effort.to_bytes())
+        } else {
+            None
         }
     }
 

@@ -89,6 +89,8 @@ pub struct Motor {
     pub inductance: u32,
     /// Friction of motor and gear.
     pub friction: Friction,
+    /// How it warms.
+    pub thermal: ThermalData,
     /// Quadrature counts per turn of the crank.
     pub counts_per_turn: u32,
     /// Most current of the bridge.
@@ -106,6 +108,23 @@ pub struct Friction {
     pub viscous: u32,
     /// Speed of the reference from which on the Coulomb friction is whole; below, in proportion.
     pub speed: AngularVelocity,
+}
+
+/// Winding and housing of a motor as two heat capacities on the way to the water.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ThermalData {
+    /// Thermal resistance from winding to housing, mK/W.
+    pub winding_resistance: u32,
+    /// Thermal resistance from housing to the water, mK/W.
+    pub housing_resistance: u32,
+    /// Heat capacity of the winding, mJ/K.
+    pub winding_capacity: u32,
+    /// Heat capacity of the housing, mJ/K.
+    pub housing_capacity: u32,
+    /// Temperature at which the current is held so that the winding stays there.
+    pub winding_limit: Temperature,
+    /// Temperature of the water, where the thermistor of the housing fails.
+    pub ambient: Temperature,
 }
 
 impl Settings {
@@ -172,6 +191,9 @@ impl Settings {
             && is_in(inductance, INDUCTANCES)
             && friction.coulomb >= Torque::ZERO
             && friction.speed > AngularVelocity::ZERO
+            && self.motor.thermal.winding_capacity > 0
+            && self.motor.thermal.housing_capacity > 0
+            && self.motor.thermal.ambient < self.motor.thermal.winding_limit
             && counts_per_turn > 0
             && self.motor.current_limit > Current::ZERO
             && self.motor.speed_limit > AngularVelocity::ZERO
@@ -186,7 +208,7 @@ impl Settings {
         let (gains, limits) = (&self.gains, &self.limits);
         let [stiffness_x, stiffness_y, stiffness_z] = gains.stiffness.map(i64::from);
         let [damping_x, damping_y, damping_z] = gains.damping.map(i64::from);
-        let friction = &self.motor.friction;
+        let (friction, thermal) = (&self.motor.friction, &self.motor.thermal);
         let angle = |angle: Angle| i64::from(angle.to_tenth_milliradians());
         Some(match field {
             Field::StiffnessX => stiffness_x,
@@ -203,6 +225,12 @@ impl Settings {
             Field::FrictionCoulomb => i64::from(friction.coulomb.to_millinewton_metres()),
             Field::FrictionViscous => i64::from(friction.viscous),
             Field::FrictionSpeed => milliradians_per_second(friction.speed),
+            Field::WindingResistance => i64::from(thermal.winding_resistance),
+            Field::HousingResistance => i64::from(thermal.housing_resistance),
+            Field::WindingCapacity => i64::from(thermal.winding_capacity),
+            Field::HousingCapacity => i64::from(thermal.housing_capacity),
+            Field::WindingLimit => i64::from(thermal.winding_limit.to_decidegrees()),
+            Field::Ambient => i64::from(thermal.ambient.to_decidegrees()),
             _ => return None,
         })
     }
@@ -212,7 +240,7 @@ impl Settings {
     pub(crate) fn set(&mut self, field: Field, value: i64) -> bool {
         let angle = Angle::from_tenth_milliradians(value as i16);
         let (gains, limits) = (&mut self.gains, &mut self.limits);
-        let friction = &mut self.motor.friction;
+        let (friction, thermal) = (&mut self.motor.friction, &mut self.motor.thermal);
         match field {
             Field::StiffnessX => gains.stiffness[0] = value as u32,
             Field::StiffnessY => gains.stiffness[1] = value as u32,
@@ -236,6 +264,14 @@ impl Settings {
             Field::FrictionSpeed => {
                 friction.speed = AngularVelocity::from_milliradians_per_second(value as i32);
             }
+            Field::WindingResistance => thermal.winding_resistance = value as u32,
+            Field::HousingResistance => thermal.housing_resistance = value as u32,
+            Field::WindingCapacity => thermal.winding_capacity = value as u32,
+            Field::HousingCapacity => thermal.housing_capacity = value as u32,
+            Field::WindingLimit => {
+                thermal.winding_limit = Temperature::from_decidegrees(value as i32);
+            }
+            Field::Ambient => thermal.ambient = Temperature::from_decidegrees(value as i32),
             _ => return false,
         }
         true
@@ -325,6 +361,14 @@ impl Motor {
             speed: AngularVelocity::from_milliradians_per_second(
                 factory(Field::FrictionSpeed) as i32
             ),
+        },
+        thermal: ThermalData {
+            winding_resistance: factory(Field::WindingResistance) as u32,
+            housing_resistance: factory(Field::HousingResistance) as u32,
+            winding_capacity: factory(Field::WindingCapacity) as u32,
+            housing_capacity: factory(Field::HousingCapacity) as u32,
+            winding_limit: Temperature::from_decidegrees(factory(Field::WindingLimit) as i32),
+            ambient: Temperature::from_decidegrees(factory(Field::Ambient) as i32),
         },
         counts_per_turn: 88_064,
         current_limit: Current::from_milliamps(2_500),

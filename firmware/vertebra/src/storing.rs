@@ -1,6 +1,6 @@
 //! What the bus asks to be stored, on its way to the platform's flash and back.
 
-use eel_canopen::{Abort, StoreRequest};
+use eel_canopen::{Abort, STORED_PARAMETERS, StoreRequest};
 use eel_protocol::NodeId;
 use eel_units::Instant;
 
@@ -16,11 +16,12 @@ impl Vertebra {
         match request {
             StoreRequest::Save(group) => {
                 if group.has_communication() {
-                    let room = record.communication.capacity();
+                    let mut saved = [0; STORED_PARAMETERS];
+                    let length = self.node.save_parameters(&mut saved).unwrap_or_default();
+                    record.communication.clear();
                     // A record holds as much as a node saves.
-                    let _ = record.communication.resize(room, 0);
-                    let length = self.node.save_parameters(&mut record.communication);
-                    record.communication.truncate(length.unwrap_or_default());
+                    let saved = saved.get(..length).unwrap_or_default();
+                    let _ = record.communication.extend_from_slice(saved);
                 }
                 if group.has_application() {
                     record.keep_settings(&self.core.settings);

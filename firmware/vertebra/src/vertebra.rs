@@ -262,11 +262,13 @@ impl Vertebra {
             let Core {
                 freeze,
                 clock,
+                thermal,
                 settings_lost,
                 ..
             } = self.core;
             self.core = Core::new(self.settings, now);
             self.core.freeze = freeze;
+            self.core.thermal = thermal;
             self.core.clock = clock;
             self.core.settings_lost = settings_lost;
             self.take_settings();

@@ -1,6 +1,6 @@
 //! Targets as they are allowed: inside the workspace, no faster than the rate limit.
 
-use eel_kinematics::{Pose, Reach, Wrist};
+use eel_kinematics::{Pose, Reach, Search, Wrist};
 use eel_units::{Angle, AngularVelocity, Duration, quotient_q30, root_q30, saturate};
 
 use crate::settings::Limits;
@@ -35,16 +35,101 @@ impl Limited {
     }
 }
 
-/// Returns the pose to follow instead of `wanted`, `period` after `previous`, and which bounds of
-/// the workspace it met. Following the rate limit is no violation and is not reported.
-pub fn admit(
-    wanted: Pose,
-    previous: Pose,
-    period: Duration,
-    limits: &Limits,
-    wrist: &Wrist,
-) -> (Pose, Limited) {
-    let range = &limits.workspace;
+/// Leads targets that the legs don't reach to the nearest place that they do. The search for it goes on
+/// between the targets, a piece in each tick, so that no tick takes long.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Guide {
+    /// The nearest place to the target.
+    goal: Option<Search>,
+    /// The nearest place to a step that leads out of reach on the way there.
+    detour: Option<Search>,
+}
+
+impl Guide {
+    /// Returns the pose to follow instead of `wanted`, `period` after `previous`, and which bounds of
+    /// the workspace it met. Following the rate limit is no violation and is not reported.
+    pub fn admit(
+        &mut self,
+        wanted: Pose,
+        previous: Pose,
+        period: Duration,
+        limits: &Limits,
+        wrist: &Wrist,
+    ) -> (Pose, Limited) {
+        let range = &limits.workspace;
+        let (boxed, mut limited) = boxed(&wanted, range);
+        let reach = Reach {
+            range: *range,
+            ..Reach::kernel()
+        };
+        let rooms = Rooms::new(&previous, range, largest_step(limits.rate, period), period);
+        let goal = self.goal(&boxed, wrist);
+        let step = rooms.bounded(&goal);
+        let is_reached = wrist.inverse(&step).is_ok();
+        if is_reached && step == boxed {
+            *self = Self::default();
+            return (step, Limited(limited));
+        }
+        // Whether the target itself is in reach, and what is nearest to it, is found out on the way.
+        aim(&mut self.goal, &boxed, &reach);
+        if goal != boxed {
+            limited |= Limited::KINEMATICS;
+        }
+        if is_reached {
+            self.detour = None;
+            return (step, Limited(limited));
+        }
+        // Each axis by itself leads out of what the legs reach: straight, then along the edge, then less.
+        limited |= Limited::KINEMATICS;
+        let is_way = |pose: &Pose| *pose != previous && wrist.inverse(pose).is_ok();
+        let straight = rooms.scaled(&goal, 0);
+        if is_way(&straight) {
+            self.detour = None;
+            return (straight, Limited(limited));
+        }
+        aim(&mut self.detour, &step, &reach);
+        let best = self.detour.as_ref().and_then(Search::best);
+        let along = best.unwrap_or(previous);
+        let shorter = [0, 1, 3].map(|halvings| rooms.scaled(&along, halvings));
+        let allowed = shorter.into_iter().find(is_way);
+        (allowed.unwrap_or(previous), Limited(limited))
+    }
+
+    /// Returns the nearest place to a target as far as it is known; the target itself where nothing is.
+    fn goal(&mut self, target: &Pose, wrist: &Wrist) -> Pose {
+        let Some(search) = &self.goal else {
+            return *target;
+        };
+        // Another target may be in reach again.
+        if search.target() != *target && wrist.inverse(target).is_ok() {
+            self.goal = None;
+            return *target;
+        }
+        search.best().unwrap_or(*target)
+    }
+
+    /// Searches on: a tick's piece.
+    pub fn advance(&mut self, wrist: &Wrist) {
+        let searches = [&mut self.goal, &mut self.detour];
+        // The second only where the first has nothing to do.
+        searches
+            .into_iter()
+            .flatten()
+            .any(|search| search.advance(wrist));
+    }
+}
+
+/// Lets a search look for a target.
+fn aim(search: &mut Option<Search>, target: &Pose, reach: &Reach) {
+    match search {
+        Some(search) if search.target() == *target => {}
+        Some(search) => search.retarget(target),
+        None => *search = Some(Search::new(target, reach)),
+    }
+}
+
+/// Returns a pose within the workspace, and the bits of the axes that were outside.
+fn boxed(wanted: &Pose, range: &Pose) -> (Pose, u8) {
     let mut limited = 0;
     let mut axis = |value: Angle, range: Angle, bit: u8| {
         let bounded = value.bounded(-range, range);
@@ -53,40 +138,12 @@ pub fn admit(
         }
         bounded
     };
-    let mut boxed = Pose {
+    let pose = Pose {
         yaw: axis(wanted.yaw, range.yaw, Limited::YAW),
         pitch: axis(wanted.pitch, range.pitch, Limited::PITCH),
         roll: axis(wanted.roll, range.roll, Limited::ROLL),
     };
-    let reach = Reach {
-        range: *range,
-        ..Reach::kernel()
-    };
-    if wrist.inverse(&boxed).is_err() {
-        limited |= Limited::KINEMATICS;
-        // Without an answer the steps below lead as near as they can.
-        if let Ok(nearest) = wrist.nearest(&boxed, &reach) {
-            boxed = nearest.pose;
-        }
-    }
-    let rooms = Rooms::new(&previous, range, largest_step(limits.rate, period), period);
-    let step = rooms.bounded(&boxed);
-    if wrist.inverse(&step).is_ok() {
-        return (step, Limited(limited));
-    }
-    // Each axis by itself leads out of what the legs reach: straight, then along the edge, then less.
-    limited |= Limited::KINEMATICS;
-    let is_way = |pose: &Pose| *pose != previous && wrist.inverse(pose).is_ok();
-    let straight = rooms.scaled(&boxed, 0);
-    if is_way(&straight) {
-        return (straight, Limited(limited));
-    }
-    let along = wrist
-        .nearest(&step, &reach)
-        .map_or(previous, |nearest| rooms.scaled(&nearest.pose, 0));
-    let shorter = [0, 1, 2, 3, 4].map(|halvings| rooms.scaled(&along, halvings));
-    let allowed = shorter.into_iter().find(is_way);
-    (allowed.unwrap_or(previous), Limited(limited))
+    (pose, limited)
 }
 
 /// How far each axis may go in a period, down and up, from where it is.
@@ -198,7 +255,7 @@ mod tests {
 
     fn admitted(wanted: Pose, previous: Pose) -> (Pose, Limited) {
         let Settings { limits, wrist, .. } = settings();
-        admit(wanted, previous, PERIOD, &limits, &wrist)
+        Guide::default().admit(wanted, previous, PERIOD, &limits, &wrist)
     }
 
     #[test]
@@ -291,8 +348,13 @@ mod tests {
                 .expect("home is allowed")
                 .pose;
             let mut at = start;
+            let mut guide = Guide::default();
             for _ in 0..200 {
-                let (next, _) = admit(target, at, PERIOD, &limits, &wrist);
+                let (next, _) = guide.admit(target, at, PERIOD, &limits, &wrist);
+                // The other nine ticks of a period.
+                for _ in 0..9 {
+                    guide.advance(&wrist);
+                }
                 assert!(wrist.inverse(&next).is_ok());
                 let step = largest_step(limits.rate, PERIOD);
                 for (one, other) in next.angles().into_iter().zip(at.angles()) {

@@ -3,7 +3,7 @@
 
 use eel_canopen::{Frame, NmtCommand};
 use eel_kinematics::{Joints, Pose};
-use eel_protocol::{Mode, State};
+use eel_protocol::{Condition, Mode, State};
 use eel_units::{Angle, Current, Temperature, Voltage};
 use eel_vertebra::{Drive, Limits, Motor, Sample};
 
@@ -307,6 +307,13 @@ fn still_works(bench: &mut Bench) {
     bench.nmt(NmtCommand::ResetNode);
     bench.nmt(NmtCommand::Start);
     bench.run(500);
+    // The currents that it was told may have left windings that have to cool.
+    let mut waited = 0;
+    while bench.holds(Condition::Temperature) {
+        bench.run(100);
+        waited += 100;
+        assert!(waited < 20_000, "{:?}", bench.vertebra.status());
+    }
     if bench.state() == State::StopOff {
         // It was stopped when it was reset, and still is.
         bench.mode = Mode::FaultReset;

@@ -149,13 +149,10 @@ fn a_fast_wrist_is_asked_for_no_more_than_the_supply_drives() {
 #[test]
 fn the_limit_code_names_the_bound_that_acts() {
     type Set = fn(&mut Bench);
-    let cases: [(LimitCode, Set); 6] = [
+    let cases: [(LimitCode, Set); 5] = [
         (LimitCode::Peak, |_| {}),
         (LimitCode::Undervoltage, |bench| {
             bench.sample.supply = Voltage::from_millivolts(18_000);
-        }),
-        (LimitCode::Overvoltage, |bench| {
-            bench.sample.supply = Voltage::from_millivolts(30_000);
         }),
         (LimitCode::Board, |bench| {
             bench.sample.board_temperature = Temperature::from_decidegrees(850);
@@ -186,6 +183,68 @@ fn the_limit_code_names_the_bound_that_acts() {
         };
         let sum = torque[0] + torque[1];
         assert!((sum - 6.0 * share).abs() < 0.1, "{code:?}: {sum} N.m");
+    }
+}
+
+#[test]
+fn what_drives_and_what_brakes_have_limits_of_their_own() {
+    // Somebody yaws the wrist at 1 rad/s; the target lies far ahead of it, or far behind.
+    let sum = |ahead: bool, set: fn(&mut Bench)| {
+        let mut windings = Windings::new(Bench::running());
+        windings.bench.follows = false;
+        windings.bench.target = pose(if ahead { 520 } else { -520 }, 0, 0);
+        set(&mut windings.bench);
+        let mut torque = [0.0; 3];
+        for step in -100..100 {
+            windings.bench.pose = pose(step, 0, 0);
+            torque = windings.tick();
+        }
+        (torque[0] + torque[1], limits(&windings.bench))
+    };
+    type Case = (fn(&mut Bench), LimitCode, f64, f64);
+    let cases: [Case; 4] = [
+        // 18 V leave a third to what drives, 30 V a third to what brakes.
+        (
+            |bench| bench.sample.supply = Voltage::from_millivolts(18_000),
+            LimitCode::Undervoltage,
+            2.0,
+            -6.0,
+        ),
+        (
+            |bench| bench.sample.supply = Voltage::from_millivolts(30_000),
+            LimitCode::Overvoltage,
+            6.0,
+            -2.0,
+        ),
+        // A hot board leaves a tenth to what drives, and a quarter to what brakes.
+        (
+            |bench| bench.sample.board_temperature = Temperature::from_decidegrees(885),
+            LimitCode::Board,
+            0.6,
+            -1.5,
+        ),
+        (|_| {}, LimitCode::Peak, 6.0, -6.0),
+    ];
+    for (set, code, driving, braking) in cases {
+        let (drives, drive_codes) = sum(true, set);
+        let (brakes, brake_codes) = sum(false, set);
+        assert!(
+            (drives - driving).abs() < 0.1,
+            "{code:?}: {drives} N.m drive"
+        );
+        assert!(
+            (brakes - braking).abs() < 0.1,
+            "{code:?}: {brakes} N.m brake"
+        );
+        let is_named = |codes: [LimitCode; 3]| codes[..2].contains(&code);
+        assert!(
+            is_named(drive_codes) || driving == 6.0,
+            "{code:?}: {drive_codes:?}"
+        );
+        assert!(
+            is_named(brake_codes) || braking == -6.0,
+            "{code:?}: {brake_codes:?}"
+        );
     }
 }
 

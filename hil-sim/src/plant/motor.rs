@@ -217,4 +217,27 @@ mod tests {
         let limited = winding.advance(&motor, 2.5, 60.0, 0.0);
         assert_eq!(limited, motor.current_limit_a);
     }
+
+    #[test]
+    fn the_firmware_knows_the_motor_that_is_simulated() {
+        let (motor, known) = (Motor::default(), eel_vertebra::Motor::PROTOTYPE);
+        let milli = |value: f64| (value * 1e3).round() as u32;
+        let micro = |value: f64| (value * 1e6).round() as u32;
+        assert_eq!(micro(motor.constant), known.torque_constant);
+        assert_eq!(milli(motor.resistance_ohm), known.resistance);
+        assert_eq!(micro(motor.inductance_h), known.inductance);
+        assert_eq!(
+            milli(motor.winding_k_per_w),
+            known.thermal.winding_resistance
+        );
+        assert_eq!(
+            milli(motor.housing_k_per_w),
+            known.thermal.housing_resistance
+        );
+        assert_eq!(milli(motor.winding_j_per_k), known.thermal.winding_capacity);
+        assert_eq!(milli(motor.housing_j_per_k), known.thermal.housing_capacity);
+        assert_eq!(milli(motor.viscous), known.friction.viscous);
+        let coulomb = known.friction.coulomb.to_millinewton_metres();
+        assert_eq!(milli(motor.coulomb_nm) as i32, i32::from(coulomb));
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use eel_canopen::{Abort, Access, Application, Entry};
+use eel_canopen::{Abort, Access, Application, Entry, Mapped};
 
 /// The most bytes that the writable domain takes.
 pub const WRITABLE_DOMAIN: usize = 4_096;
@@ -184,9 +184,10 @@ impl Application for Objects {
         let _ = self.count();
     }
 
-    fn tpdo_due(&mut self, number: u8, _cob_id: u16) {
-        assert!(matches!(number, 1..=4));
+    fn tpdo_due(&mut self, number: u8, _: u16, mapping: &[Mapped]) -> Option<[u8; 8]> {
+        assert!(matches!(number, 1..=4) && mapping.len() <= 8);
         let _ = self.count();
+        None
     }
 
     fn synchronised(&mut self, _counter: Option<u8>) {

@@ -325,6 +325,4 @@ impl Application for Nothing {
     }
 
     fn rpdo_applied(&mut self, _: u8, _: u16) {}
-
-    fn tpdo_due(&mut self, _: u8, _: u16) {}
 }

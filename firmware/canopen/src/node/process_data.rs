@@ -87,8 +87,9 @@ impl Node {
             return;
         };
         let parameters = &tpdo.parameters;
-        app.tpdo_due(place as u8 + 1, parameters.cob_id());
-        match read_mapped(parameters.mapping(), &communication.emergency, app) {
+        let mapping = parameters.mapping();
+        let ready = app.tpdo_due(place as u8 + 1, parameters.cob_id(), mapping);
+        match ready.or_else(|| read_mapped(mapping, &communication.emergency, app)) {
             Some(data) => transmit.replace(parameters.cob_id(), data, parameters.bytes()),
             None => self.tpdos_refused = self.tpdos_refused.saturating_add(1),
         }

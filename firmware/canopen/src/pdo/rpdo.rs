@@ -73,12 +73,15 @@ impl Rpdo {
     /// Writes the data that waits, if any, and tells whether the application took it all.
     pub fn apply(&mut self, number: u8, app: &mut impl Application) -> Option<bool> {
         let data = self.pending.take()?;
-        let mut rest: &[u8] = &data;
-        for mapped in self.parameters.mapping() {
-            let (value, others) = rest.split_at_checked(mapped.bytes())?;
-            rest = others;
-            if !mapped.is_dummy() && app.write(mapped.index, mapped.subindex, value).is_err() {
-                return Some(false);
+        let mapping = self.parameters.mapping();
+        if !app.take_rpdo(mapping, &data) {
+            let mut rest: &[u8] = &data;
+            for mapped in mapping {
+                let (value, others) = rest.split_at_checked(mapped.bytes())?;
+                rest = others;
+                if !mapped.is_dummy() && app.write(mapped.index, mapped.subindex, value).is_err() {
+                    return Some(false);
+                }
             }
         }
         app.rpdo_applied(number, self.parameters.cob_id());

@@ -243,8 +243,9 @@ impl Application for Store {
         self.calls.push(Call::Applied(number, cob_id));
     }
 
-    fn tpdo_due(&mut self, number: u8, cob_id: u16) {
+    fn tpdo_due(&mut self, number: u8, cob_id: u16, _: &[Mapped]) -> Option<[u8; 8]> {
         self.calls.push(Call::Due(number, cob_id));
+        None
     }
 
     fn synchronised(&mut self, counter: Option<u8>) {

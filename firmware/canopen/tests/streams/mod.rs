@@ -161,8 +161,6 @@ impl Application for Streams {
 
     fn rpdo_applied(&mut self, _: u8, _: u16) {}
 
-    fn tpdo_due(&mut self, _: u8, _: u16) {}
-
     fn open_domain(&mut self, index: u16, subindex: u8) -> Result<u32, Abort> {
         assert!(self.writing.is_none(), "read while it is written");
         if let Some(abort) = self.refuse_open {

@@ -170,6 +170,32 @@ const FRICTION_SPEED: Shape = Shape {
     max: 5_000,
     ..thousandths(DataType::U16, RW, NO, "rad/s")
 };
+const fn thermal_resistance(default: i64) -> Shape {
+    Shape {
+        default,
+        min: 10,
+        max: 1_000_000,
+        ..thousandths(DataType::U32, RW, NO, "K/W")
+    }
+}
+const fn heat_capacity(default: i64) -> Shape {
+    Shape {
+        default,
+        min: 100,
+        max: 10_000_000,
+        ..thousandths(DataType::U32, RW, NO, "J/K")
+    }
+}
+const fn limit_temperature(default: i64) -> Shape {
+    Shape {
+        default,
+        min: -400,
+        max: 2_000,
+        access: RW,
+        pdo: NO,
+        ..TEMPERATURE
+    }
+}
 const SYNC_PHASE: Shape = Shape {
     data_type: DataType::I16,
     min: -32_768,
@@ -341,6 +367,16 @@ records! {
             "Viscous friction of a crank, that the controller adds along the reference's motion.";
         3 FrictionSpeed "friction_speed" FRICTION_SPEED,
             "Speed of a crank from which on its Coulomb friction is added whole.";
+        4 WindingResistance "winding_resistance" thermal_resistance(3_100),
+            "Thermal resistance from a motor's winding to its housing.";
+        5 HousingResistance "housing_resistance" thermal_resistance(13_000),
+            "Thermal resistance from a motor's housing to the water.";
+        6 WindingCapacity "winding_capacity" heat_capacity(4_000), "Heat capacity of a winding.";
+        7 HousingCapacity "housing_capacity" heat_capacity(46_000), "Heat capacity of a housing.";
+        8 WindingLimit "winding_limit" limit_temperature(1_050),
+            "Temperature at which a winding is held by its current; a fault 10 K above.";
+        9 Ambient "ambient" limit_temperature(150),
+            "Temperature of the water, where a housing's thermistor fails.";
     }
     HEALTH = 0x2030 "health", "Supply, temperatures and counters." {
         1 Supply "supply" SUPPLY, "Supply voltage of the bridges.";
@@ -356,6 +392,9 @@ records! {
             "Frames lost since power-up because a receive queue was full.";
         9 TransmitOverruns "transmit_overruns" COUNT,
             "Frames dropped since power-up because a transmit queue was full.";
+        10 WindingTemperature1 "winding1_temperature" TEMPERATURE, "Temperature of motor 1's winding, by a model.";
+        11 WindingTemperature2 "winding2_temperature" TEMPERATURE, "Temperature of motor 2's winding, by a model.";
+        12 WindingTemperature3 "winding3_temperature" TEMPERATURE, "Temperature of motor 3's winding, by a model.";
     }
     TIMING = 0x2040 "timing", "The control loop's time and the beat of the bus." {
         1 LoopLast "loop_last" MICROSECONDS, "Time that the last control tick took.";
