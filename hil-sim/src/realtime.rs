@@ -154,7 +154,7 @@ impl<B: Bus> Realtime<B> {
             frames.extend(others.map(|(_, frame)| *frame));
             frames.extend_from_slice(&self.incoming);
             let sample = self.plant.sample(index);
-            self.drives[index] = node.turn(now, &frames, &sample, room, &mut sent).drives;
+            self.drives[index] = node.turn(now, &frames, &sample, room, &mut sent);
             self.local
                 .extend(sent.drain(..).map(|frame| (index, frame)));
         }

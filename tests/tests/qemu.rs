@@ -19,7 +19,7 @@ use eel_tests::skip;
 use eel_units::{Angle, Instant as Moment, Voltage};
 use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, Output, Start};
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Actions, Drive, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Settings, Vertebra, turn};
 use hil_sim::bus::Event as BusEvent;
 use hil_sim::plant::Plant;
 use hil_sim::robot::{Config, Node, Observer, Robot, Turn};
@@ -246,12 +246,12 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
             Step::Turn(input) => {
                 let vertebra = vertebra.as_mut().expect("started");
                 let mut output = Output {
-                    actions: Actions::IDLE,
+                    drives: [Drive::Off; 3],
                     frames: Default::default(),
                 };
                 let heard = input.frames.iter().copied();
                 let (sample, room) = (&input.sample, input.room.into());
-                output.actions = turn(vertebra, input.now, heard, sample, room, |frame| {
+                output.drives = turn(vertebra, input.now, heard, sample, room, |frame| {
                     output
                         .frames
                         .push(frame)
@@ -270,7 +270,7 @@ fn check_that_much_happened(outputs: &[Output]) {
     let count = |wanted: fn(&Drive) -> bool| {
         outputs
             .iter()
-            .filter(|output| output.actions.drives.iter().any(wanted))
+            .filter(|output| output.drives.iter().any(wanted))
             .count()
     };
     let driven = count(

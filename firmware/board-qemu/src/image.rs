@@ -3,7 +3,7 @@
 use cortex_m_semihosting::debug;
 use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Actions, Drive, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Settings, Vertebra, turn};
 
 use crate::console::{leave, say};
 use crate::meter::Meter;
@@ -73,9 +73,9 @@ fn run() -> Result<(), Failure> {
                 let given = lockstep::Input::decode(body)?;
                 let mut frames = Frames::new();
                 let work = || answer(vertebra, &given, &mut frames);
-                let actions = meter.count(work, is_driven);
+                let drives = meter.count(work, is_driven);
                 store::serve(vertebra, &mut store, given.now);
-                let made = lockstep::Output { actions, frames };
+                let made = lockstep::Output { drives, frames };
                 output.write_all(made.encode().as_bytes())?;
             }
             (Kind::Input, None) | (Kind::Output, _) => return Err(Failure::Order),
@@ -90,13 +90,13 @@ fn run() -> Result<(), Failure> {
 }
 
 /// Tells whether a turn ends with a motor driven.
-fn is_driven(actions: &Actions) -> bool {
-    let mut drives = actions.drives.iter();
+fn is_driven(drives: &[Drive; 3]) -> bool {
+    let mut drives = drives.iter();
     drives.any(|drive| matches!(drive, Drive::Current(_)))
 }
 
 /// Does one turn, whose frames are appended.
-fn answer(vertebra: &mut Vertebra, given: &lockstep::Input, frames: &mut Frames) -> Actions {
+fn answer(vertebra: &mut Vertebra, given: &lockstep::Input, frames: &mut Frames) -> [Drive; 3] {
     let lockstep::Input {
         now,
         sample,

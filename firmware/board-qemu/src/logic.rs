@@ -59,10 +59,10 @@ mod image {
             room,
         } = input;
         let heard = heard.iter().copied();
-        let actions = turn(vertebra, now, heard, &sample, room.into(), |frame| {
+        let drives = turn(vertebra, now, heard, &sample, room.into(), |frame| {
             black_box(frames.push(frame).is_ok());
         });
-        black_box(lockstep::Output { actions, frames }.encode().as_bytes());
+        black_box(lockstep::Output { drives, frames }.encode().as_bytes());
         black_box((
             vertebra.state(),
             vertebra.status(),

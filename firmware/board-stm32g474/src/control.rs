@@ -79,7 +79,7 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         let start = Instant::now();
         let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
-        let actions = turn(
+        let drives = turn(
             &mut vertebra,
             now(),
             frames,
@@ -87,7 +87,7 @@ pub async fn run(hardware: Hardware, birth: Birth) {
             bus::room(),
             bus::send,
         );
-        bridges.apply(actions.drives, sample.supply);
+        bridges.apply(drives, sample.supply);
         // Before anybody can answer what the turn sends: a boot-up under a new node id, say.
         let identifiers = vertebra.identifiers();
         if identifiers != heard {
@@ -131,7 +131,6 @@ fn measure(
         motor_temperature,
         bridge_fault: from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
         emergency_stop: bridges.take_emergency_stop(),
-        chain_in: false,
     }
 }
 

@@ -21,28 +21,6 @@ pub struct Sample {
     pub bridge_fault: [bool; 3],
     /// Whether the emergency stop line is asserted.
     pub emergency_stop: bool,
-    /// Whether the neighbour towards the head raises its end of the daisy line.
-    pub chain_in: bool,
-}
-
-/// What a vertebra does until its next tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Actions {
-    /// What each bridge does.
-    pub drives: [Drive; 3],
-    /// Whether the daisy line to the neighbour towards the tail is raised.
-    pub chain_out: bool,
-    /// By how much the time to the next tick is to be longer than a millisecond, ns.
-    pub tick_trim_ns: i32,
-}
-
-impl Actions {
-    /// Does nothing: bridges off, line low, ticks of a millisecond.
-    pub const IDLE: Self = Self {
-        drives: [Drive::Off; 3],
-        chain_out: false,
-        tick_trim_ns: 0,
-    };
 }
 
 /// What a bridge does until the next tick.

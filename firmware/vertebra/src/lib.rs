@@ -46,7 +46,7 @@ pub use command::TARGET_TIMEOUT;
 pub use current::{CURRENT_LOOP_HZ, CurrentLoop, Switching};
 pub use eel_canopen::Identifiers;
 pub use events::Event;
-pub use io::{Actions, Drive, Sample, Setpoint};
+pub use io::{Drive, Sample, Setpoint};
 pub use machine::{STOP_BRAKE, STOP_DAMPED};
 pub use settings::{Friction, Gains, Limits, Motor, Ramp, Settings, ThermalData, Travel};
 pub use vertebra::{Vertebra, turn};

@@ -11,7 +11,7 @@ use eel_units::{Angle, Current, Instant, Temperature, Voltage};
 use embedded_can::{ExtendedId, StandardId};
 use heapless::Vec;
 
-use crate::io::{Actions, Drive, Sample, Setpoint};
+use crate::io::{Drive, Sample, Setpoint};
 
 /// The layout; another one has another number.
 pub const VERSION: u8 = 3;
@@ -25,9 +25,9 @@ pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + 1 + MAX_FRAMES * FRAM
 const TIME: usize = 8;
 const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1;
 const FRAME: usize = 4 + 1 + 8;
-const ACTIONS: usize = 3 * (1 + 4 + 4) + 1 + 4;
+const DRIVES: usize = 3 * (1 + 4 + 4);
 
-const _: () = assert!(ACTIONS + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
+const _: () = assert!(DRIVES + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
 
 const EXTENDED: u32 = 1 << 31;
@@ -96,8 +96,8 @@ pub struct Input {
 /// What a vertebra makes of a turn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
-    /// What it does until the next one.
-    pub actions: Actions,
+    /// What the bridges do.
+    pub drives: [Drive; 3],
     /// What it sends, in this order.
     pub frames: Frames,
 }
@@ -246,7 +246,7 @@ impl Output {
     /// Makes the packet.
     pub fn encode(&self) -> Packet {
         let mut packet = Packet::new(Kind::Output);
-        for drive in self.actions.drives {
+        for drive in self.drives {
             let (code, setpoint) = match drive {
                 Drive::Off => (0, Setpoint::default()),
                 Drive::Brake => (1, Setpoint::default()),
@@ -256,8 +256,6 @@ impl Output {
             packet.put_i32(setpoint.current.to_microamps());
             packet.put_i32(setpoint.emf.to_millivolts());
         }
-        packet.put(&[u8::from(self.actions.chain_out)]);
-        packet.put_i32(self.actions.tick_trim_ns);
         packet.put_frames(&self.frames);
         packet.finish()
     }
@@ -280,19 +278,9 @@ impl Output {
                 _ => return Err(PacketError::Value),
             };
         }
-        let chain_out = match reader.take_u8()? {
-            0 => false,
-            1 => true,
-            _ => return Err(PacketError::Value),
-        };
-        let actions = Actions {
-            drives,
-            chain_out,
-            tick_trim_ns: reader.take_i32()?,
-        };
         let frames = reader.take_frames()?;
         reader.finish()?;
-        Ok(Self { actions, frames })
+        Ok(Self { drives, frames })
     }
 }
 
@@ -315,8 +303,7 @@ fn put_sample(packet: &mut Packet, sample: &Sample) {
         packet.put_i32(temperature.to_decidegrees());
     }
     let stop = u8::from(sample.emergency_stop) << 3;
-    let chain = u8::from(sample.chain_in) << 4;
-    packet.put(&[to_bits(sample.bridge_fault) | stop | chain]);
+    packet.put(&[to_bits(sample.bridge_fault) | stop]);
 }
 
 fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
@@ -343,9 +330,8 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
         supply,
         board_temperature,
         motor_temperature,
-        bridge_fault: from_bits(flags & !(3 << 3))?,
+        bridge_fault: from_bits(flags & !(1 << 3))?,
         emergency_stop: flags & 1 << 3 != 0,
-        chain_in: flags & 1 << 4 != 0,
     })
 }
 

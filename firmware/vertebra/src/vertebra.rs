@@ -13,7 +13,7 @@ use eel_units::{Angle, Duration, Instant};
 use crate::core::Core;
 use crate::events::Event;
 use crate::freezing::Clock;
-use crate::io::{Actions, Sample};
+use crate::io::{Drive, Sample};
 use crate::records::Records;
 use crate::served::Served;
 use crate::settings::Settings;
@@ -52,18 +52,18 @@ pub fn turn(
     sample: &Sample,
     room: usize,
     mut send: impl FnMut(Frame),
-) -> Actions {
+) -> [Drive; 3] {
     for frame in frames {
         vertebra.handle_frame(now, &frame);
     }
-    let actions = vertebra.handle_sample(now, sample);
+    let drives = vertebra.handle_sample(now, sample);
     for _ in 0..room {
         let Some(frame) = vertebra.poll_transmit() else {
             break;
         };
         send(frame);
     }
-    actions
+    drives
 }
 
 impl Vertebra {
@@ -124,9 +124,9 @@ impl Vertebra {
         self.hand_over_emergencies(now);
     }
 
-    /// Takes the measurements of a control tick, once per millisecond, and returns what to do
-    /// until the next.
-    pub fn handle_sample(&mut self, now: Instant, sample: &Sample) -> Actions {
+    /// Takes the measurements of a control tick, once per millisecond, and returns what the
+    /// bridges do until the next.
+    pub fn handle_sample(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
         self.core.now = now;
         let mut served = Served {
             core: &mut self.core,
@@ -141,10 +141,7 @@ impl Vertebra {
         };
         served.capture();
         self.hand_over_emergencies(now);
-        Actions {
-            drives,
-            ..Actions::IDLE
-        }
+        drives
     }
 
     /// Returns the next frame to send.

@@ -288,7 +288,6 @@ fn sample(random: &mut Random) -> Sample {
             .map(|ordinary| Temperature::from_decidegrees(any(random, ordinary))),
         bridge_fault: [false; 3].map(|_| random.once_in(12)),
         emergency_stop: random.once_in(12),
-        chain_in: random.once_in(2),
     }
 }
 

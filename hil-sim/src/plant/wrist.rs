@@ -152,7 +152,6 @@ impl Wrist {
             motor_temperature: std::array::from_fn(|i| decidegrees(self.motors[i].housing_c)),
             bridge_fault: [false; 3],
             emergency_stop: false,
-            chain_in: false,
         }
     }
 

@@ -16,7 +16,7 @@ mod tests;
 use eel_head::{Config as HeadConfig, Event as HeadEvent, Head};
 use eel_protocol::{Cob, HEAD_NODE, NodeId, VERTEBRAE};
 use eel_units::Instant;
-use eel_vertebra::{Actions, Drive, Sample};
+use eel_vertebra::{Drive, Sample};
 
 use crate::bus::{
     BitRate, Bus, ControllerConfig, Event as BusEvent, Fifo, Filter, FilterMatch, Statistics,
@@ -92,7 +92,7 @@ struct Seat {
     id: NodeId,
     node: Box<dyn Node>,
     link: Link,
-    actions: Actions,
+    drives: [Drive; 3],
 }
 
 impl Robot {
@@ -123,7 +123,7 @@ impl Robot {
                 id,
                 node: make(id)?,
                 link,
-                actions: Actions::IDLE,
+                drives: [Drive::Off; 3],
             });
         }
         let mut faults = config.faults.clone();
@@ -191,7 +191,7 @@ impl Robot {
 
     /// Returns the drives of a vertebra since its last turn.
     pub fn drives(&self, id: NodeId) -> [Drive; 3] {
-        self.nodes[id.index()].actions.drives
+        self.nodes[id.index()].drives
     }
 
     /// Returns the counters of the bus.
@@ -239,7 +239,7 @@ impl Robot {
     fn step_plant(&mut self) {
         let mut drives = [[Drive::Off; 3]; NODES];
         for (drives, seat) in drives.iter_mut().zip(&self.nodes) {
-            *drives = seat.actions.drives;
+            *drives = seat.drives;
         }
         self.plant.step(&drives);
     }
@@ -269,7 +269,7 @@ impl Robot {
         let frames = seat.link.received();
         let mut sent = Vec::new();
         let room = seat.link.room();
-        seat.actions = seat.node.turn(now, &frames, &sample, room, &mut sent);
+        seat.drives = seat.node.turn(now, &frames, &sample, room, &mut sent);
         for frame in &sent {
             seat.link.send(&mut self.bus, self.now_ns, *frame);
         }
@@ -279,7 +279,7 @@ impl Robot {
             sample: &sample,
             room,
             sent: &sent,
-            actions: seat.actions,
+            drives: seat.drives,
         };
         observer.turn(seat.id, seat.node.as_ref(), &turn, &self.plant);
     }
@@ -302,7 +302,7 @@ impl Robot {
                     seat.link.power(&mut self.bus, self.now_ns, false);
                     seat.link.power(&mut self.bus, self.now_ns, true);
                     seat.node.reset(instant(self.now_ns));
-                    seat.actions = Actions::IDLE;
+                    seat.drives = [Drive::Off; 3];
                 }
             }
         }

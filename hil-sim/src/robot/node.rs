@@ -3,7 +3,7 @@
 use eel_protocol::{Frame, NodeId, State};
 use eel_units::Instant;
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Actions, Event, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Event, Sample, Settings, Vertebra, turn};
 
 /// Everything that went into a turn and came out of it.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +18,8 @@ pub struct Turn<'a> {
     pub room: usize,
     /// What it sent.
     pub sent: &'a [Frame],
-    /// What it does until the next.
-    pub actions: Actions,
+    /// What its bridges do.
+    pub drives: [Drive; 3],
 }
 
 /// Something that is a vertebra: natively, in an emulator, or on a board.
@@ -32,7 +32,7 @@ pub trait Node {
         sample: &Sample,
         room: usize,
         sent: &mut Vec<Frame>,
-    ) -> Actions;
+    ) -> [Drive; 3];
 
     /// Starts anew, as after a power cycle of the microcontroller.
     fn reset(&mut self, now: Instant);
@@ -99,13 +99,13 @@ impl Node for NativeNode {
         sample: &Sample,
         room: usize,
         sent: &mut Vec<Frame>,
-    ) -> Actions {
+    ) -> [Drive; 3] {
         let frames = frames.iter().copied();
-        let actions = turn(&mut self.vertebra, now, frames, sample, room, |frame| {
+        let drives = turn(&mut self.vertebra, now, frames, sample, room, |frame| {
             sent.push(frame);
         });
         store::serve(&mut self.vertebra, &mut self.store, now);
-        actions
+        drives
     }
 
     fn reset(&mut self, now: Instant) {

@@ -14,7 +14,7 @@ use anyhow::{Context, bail, ensure};
 use eel_protocol::{Frame, NodeId, PoseReport, State};
 use eel_units::Instant;
 use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, MAX_FRAMES, Output, Start};
-use eel_vertebra::{Actions, Event, Sample, Vertebra};
+use eel_vertebra::{Drive, Event, Sample, Vertebra};
 use tempfile::TempDir;
 
 use super::node::{Node, prototype};
@@ -144,9 +144,9 @@ impl Node for QemuNode {
         sample: &Sample,
         room: usize,
         sent: &mut Vec<Frame>,
-    ) -> Actions {
+    ) -> [Drive; 3] {
         if self.failure.is_some() {
-            return Actions::IDLE;
+            return [Drive::Off; 3];
         }
         let input = Input {
             now,
@@ -170,11 +170,11 @@ impl Node for QemuNode {
                     }
                 }
                 sent.extend(output.frames);
-                output.actions
+                output.drives
             }
             Err(error) => {
                 self.fail(error);
-                Actions::IDLE
+                [Drive::Off; 3]
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use eel_head::Gait;
 use eel_protocol::{Frame, State};
-use eel_vertebra::{Actions, Event, Vertebra};
+use eel_vertebra::{Event, Vertebra};
 
 use super::*;
 
@@ -31,7 +31,7 @@ impl Node for Deaf {
         sample: &Sample,
         room: usize,
         sent: &mut Vec<Frame>,
-    ) -> Actions {
+    ) -> [Drive; 3] {
         let runs = self.state() == Some(State::Run);
         let mut heard = frames.to_vec();
         let target = Cob::Target(self.id.get()).id();

@@ -51,7 +51,6 @@ impl Bench {
                 motor_temperature: [Temperature::from_decidegrees(250); 3],
                 bridge_fault: [false; 3],
                 emergency_stop: false,
-                chain_in: false,
             },
             now,
             counter: Counter::default(),
@@ -163,7 +162,7 @@ impl Bench {
 
     fn tick(&mut self) {
         self.now = self.now + Duration::from_millis(1);
-        let drives = self.vertebra.handle_sample(self.now, &self.sample).drives;
+        let drives = self.vertebra.handle_sample(self.now, &self.sample);
         let state = self.vertebra.state();
         for drive in drives {
             if let Drive::Current(setpoint) = drive {

@@ -68,7 +68,7 @@ impl Observer for Watch {
                 self.states.push((now, id, state));
             }
         }
-        let kinds = turn.actions.drives.map(|drive| match drive {
+        let kinds = turn.drives.map(|drive| match drive {
             Drive::Off => Kind::Off,
             Drive::Brake => Kind::Brake,
             Drive::Current(_) => Kind::Current,

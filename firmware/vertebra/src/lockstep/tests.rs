@@ -29,14 +29,10 @@ fn frames() -> impl Strategy<Value = Frames> {
 fn input() -> impl Strategy<Value = Input> {
     type Three = [i32; 3];
     let numbers = any::<(Three, [Option<i32>; 3], Three, i32, i32, Three)>();
-    let others = (
-        any::<([bool; 3], bool, bool)>(),
-        frames(),
-        0..=MAX_FRAMES as u8,
-    );
+    let others = (any::<([bool; 3], bool)>(), frames(), 0..=MAX_FRAMES as u8);
     (any::<u64>(), numbers, others).prop_map(
         |(now, (counts, angles, currents, supply, board, motors), others)| {
-            let ((faults, stop, chain), frames, room) = others;
+            let ((faults, stop), frames, room) = others;
             let sample = Sample {
                 encoder_counts: counts,
                 absolute: angles.map(|angle| angle.map(Angle::from_q29)),
@@ -46,7 +42,6 @@ fn input() -> impl Strategy<Value = Input> {
                 motor_temperature: motors.map(Temperature::from_decidegrees),
                 bridge_fault: faults,
                 emergency_stop: stop,
-                chain_in: chain,
             };
             Input {
                 now: Instant::from_micros(now),
@@ -91,12 +86,9 @@ proptest! {
 
     #[test]
     fn an_output_survives_the_way_there_and_back(
-        drives in [drive(), drive(), drive()],
-        (chain_out, tick_trim_ns) in any::<(bool, i32)>(),
-        frames in frames()
+        drives in [drive(), drive(), drive()], frames in frames()
     ) {
-        let actions = Actions { drives, chain_out, tick_trim_ns };
-        let output = Output { actions, frames };
+        let output = Output { drives, frames };
         let packet = output.encode();
         prop_assert_eq!(Output::decode(open(&packet, Kind::Output)), Ok(output));
     }
@@ -163,7 +155,7 @@ fn the_longest_packet_has_room() {
     let frame = Frame::standard(0x7FF, &[0xFF; 8]).unwrap();
     let frames: Frames = core::iter::repeat_n(frame, MAX_FRAMES).collect();
     let output = Output {
-        actions: Actions::IDLE,
+        drives: [Drive::Brake; 3],
         frames,
     };
     let packet = output.encode();

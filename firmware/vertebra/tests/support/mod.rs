@@ -205,8 +205,7 @@ impl Bench {
             &self.sample,
             self.room,
             |frame| sent.push(Sent { at, frame }),
-        )
-        .drives;
+        );
         store::serve(&mut self.vertebra, &mut self.store, now);
         if self.follows
             && let Some(reference) = self.vertebra.reference()
@@ -402,7 +401,6 @@ pub fn healthy() -> Sample {
         motor_temperature: [Temperature::from_decidegrees(250); 3],
         bridge_fault: [false; 3],
         emergency_stop: false,
-        chain_in: false,
     }
 }
 
