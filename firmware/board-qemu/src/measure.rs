@@ -142,23 +142,23 @@ fn measure(stopwatch: &Stopwatch, case: &Case) -> [u32; NAMES.len()] {
 
 /// Counts a turn of the current loop, three motors driven, repeated.
 fn repeat_current_loop(stopwatch: &Stopwatch, case: &Case) -> u32 {
-    let electrical = [0, 1, 2].map(|motor| {
-        // As much current as torque in mN·m, twice in mA.
+    // As many mA as the case's moment has mN·m, about.
+    let currents = [0, 1, 2].map(|axis| {
         let milli = case
             .moment
-            .get(motor)
+            .get(axis)
             .map_or(0, |torque| torque.to_q24() >> 14);
         Current::from_milliamps(milli)
     });
     let mut current_loop = CurrentLoop::new(&Motor::PROTOTYPE);
-    let drives = electrical.map(|current| {
+    let drives = currents.map(|current| {
         Drive::Current(Setpoint {
             current,
             emf: Voltage::from_millivolts(3_000),
         })
     });
     current_loop.set(&drives, Voltage::from_millivolts(24_000));
-    repeat(stopwatch, || current_loop.update(black_box(electrical)))
+    repeat(stopwatch, || current_loop.update(black_box(currents)))
 }
 
 /// Where the nearest pose is looked for: all that the kernel reaches.

@@ -5,8 +5,8 @@
 //! assembly margin. Each step makes these functions planes at the present pose (differences of the
 //! functions themselves), and takes the point of all the planes' positive sides that is nearest to the
 //! target (Hildreth's iteration, the box included); where that is not allowed, the place on its way
-//! home where it becomes so. The nearest of all steps counts. Bounded work: for targets, once a SYNC, not
-//! for the control tick.
+//! home where it becomes so. The nearest of all steps counts. A control tick has
+//! time for a piece of it: see [`Search`].
 
 use eel_units::{Angle, quotient_q30, saturate};
 

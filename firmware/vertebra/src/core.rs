@@ -332,14 +332,10 @@ impl Core {
             State::Run => {
                 let (elapsed, period) = self.stream.place(self.now);
                 let reference = self.spline.reference(elapsed, period);
-                let omega = reference.pose.angular_velocity(reference.rates);
                 self.compensate(&reference.pose);
-                self.pull(motion, reference, omega)
+                self.pull(motion, reference)
             }
-            State::Hold => {
-                let rest = [AngularVelocity::ZERO; 3];
-                self.pull(motion, Reference::at_rest(self.hold), rest)
-            }
+            State::Hold => self.pull(motion, Reference::at_rest(self.hold)),
             State::Moment => self.push(motion),
             State::Motor => return self.drive_motors(motion, cap, sample),
             _ => self.impedance.damping(motion),
@@ -372,14 +368,10 @@ impl Core {
     }
 
     /// Returns the moment towards a reference, and remembers how far off the wrist is.
-    fn pull(
-        &mut self,
-        motion: &Motion,
-        reference: Reference,
-        omega: [AngularVelocity; 3],
-    ) -> [Torque; 3] {
-        let feed = &self.feed_forward;
-        let (moment, error) = self.impedance.moment(motion, &reference.pose, omega, feed);
+    fn pull(&mut self, motion: &Motion, reference: Reference) -> [Torque; 3] {
+        let Reference { pose, rates } = reference;
+        let (omega, feed) = (pose.angular_velocity(rates), &self.feed_forward);
+        let (moment, error) = self.impedance.moment(motion, &pose, omega, feed);
         let worst = error.iter().map(|axis| axis.abs()).max();
         self.watch_following(worst.unwrap_or_default());
         self.reference = Some(reference);

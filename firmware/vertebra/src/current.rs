@@ -135,8 +135,6 @@ struct LoopGains {
 #[derive(Clone, Copy, Debug)]
 struct Channel {
     drive: Drive,
-    /// i*, µA.
-    wanted: i32,
     /// k ω + R i* within the supply, units.
     feed: i32,
     /// Units.
@@ -146,7 +144,6 @@ struct Channel {
 impl Channel {
     const OFF: Self = Self {
         drive: Drive::Off,
-        wanted: 0,
         feed: 0,
         integral: 0,
     };
@@ -179,11 +176,10 @@ impl CurrentLoop {
         // 32767 · 2¹⁶ / mV is 32767 · 2²⁰ / units; eight bits more make Q28.
         self.duty_per_unit = ((32_767 << 16) / supply) << 8;
         for (channel, drive) in self.channels.iter_mut().zip(drives) {
-            channel.drive = *drive;
             match drive {
                 Drive::Current(Setpoint { current, emf }) => {
-                    channel.wanted = current.to_microamps();
-                    let drop = multiply_high(channel.wanted, self.gains.resistance);
+                    channel.drive = *drive;
+                    let drop = multiply_high(current.to_microamps(), self.gains.resistance);
                     let feed = emf
                         .to_millivolts()
                         .saturating_mul(UNITS)
@@ -210,10 +206,12 @@ impl CurrentLoop {
             *switching = match channel.drive {
                 Drive::Off => Switching::Off,
                 Drive::Brake => Switching::Brake,
-                Drive::Current(_) => {
-                    let duty = channel.advance(&self.gains, self.supply, measured);
+                Drive::Current(Setpoint { current, .. }) => {
+                    let error = current - measured;
+                    let voltage = channel.advance(&self.gains, self.supply, error);
                     // Q28 × 2⁴ units: the high word of the product is the duty.
-                    Switching::Duty(Duty::from_q15(multiply_high(duty << 4, self.duty_per_unit)))
+                    let duty = multiply_high(voltage << 4, self.duty_per_unit);
+                    Switching::Duty(Duty::from_q15(duty))
                 }
             };
         }
@@ -224,8 +222,8 @@ impl CurrentLoop {
 impl Channel {
     /// Returns the voltage for the next period, in units, within the supply.
     #[inline]
-    fn advance(&mut self, gains: &LoopGains, supply: i32, measured: Current) -> i32 {
-        let error = self.wanted.saturating_sub(measured.to_microamps());
+    fn advance(&mut self, gains: &LoopGains, supply: i32, error: Current) -> i32 {
+        let error = error.to_microamps();
         let voltage = self
             .feed
             .saturating_add(self.integral)

@@ -72,25 +72,6 @@ impl Impedance {
         )
     }
 
-    /// Returns the moment towards the pose `inside` and the angular velocity `slow`, at full stiffness.
-    pub fn restoring(
-        &self,
-        motion: &Motion,
-        inside: &Pose,
-        slow: [AngularVelocity; 3],
-    ) -> [Torque; 3] {
-        let error = motion
-            .direct
-            .rotation
-            .error_to(&Rotation::from_pose(inside));
-        // Q16 × Q29 is Q45; the torque is Q24.
-        let spring = product(self.stiffness, error.map(Angle::to_q29), |torque| {
-            torque >> 21
-        });
-        let [s, d] = [spring, self.damper(slow, motion.omega)];
-        [s[0] + d[0], s[1] + d[1], s[2] + d[2]]
-    }
-
     /// Returns the moment that brings the motion to rest.
     pub fn damping(&self, motion: &Motion) -> [Torque; 3] {
         self.damper([AngularVelocity::ZERO; 3], motion.omega)

@@ -8,7 +8,7 @@ use eel_kinematics::{Bounds, Policy, Pose, Side};
 use eel_units::{AngularVelocity, Torque};
 
 use crate::core::Core;
-use crate::impedance::Motion;
+use crate::impedance::{FeedForward, Motion};
 use crate::io::{Drive, Sample};
 
 /// Speed of a crank above which a commissioned motor is braked: 1 rad/s.
@@ -72,7 +72,8 @@ impl Core {
         if inside == self.pose && slow == motion.omega {
             return None;
         }
-        Some(self.impedance.restoring(motion, &inside, slow))
+        let neutral = FeedForward::NEUTRAL;
+        Some(self.impedance.moment(motion, &inside, slow, &neutral).0)
     }
 }
 

@@ -106,7 +106,7 @@ impl Thermal {
         self.housing = measured.unwrap_or(limit(data.ambient));
         let room = (limit(data.winding_limit) - self.housing).max(0);
         self.winding = self.housing + room * part / whole;
-        self.take_loss(&Motor::PROTOTYPE);
+        (self.squares, self.count) = (0, 0);
     }
 
     /// Returns the mean copper loss since the last call, µW.
