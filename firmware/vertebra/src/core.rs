@@ -20,6 +20,7 @@ use crate::machine::Machine;
 use crate::objects::{Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
 use crate::settings::Settings;
+use crate::spare::Spare;
 use crate::spline::{Reference, Spline};
 use crate::thermal::Thermal;
 use crate::workspace::{Guide, Limited};
@@ -49,7 +50,7 @@ pub(crate) struct Core {
     pub is_too_hot: [bool; 3],
     /// Which bridges were off since the last tick.
     pub is_open: [bool; 3],
-    /// What the tick does besides, of what need not be done in each.
+    /// Whose turn it is to be done besides: see [`Core::spare`].
     pub turn: u8,
     pub now: Instant,
     pub operational: bool,
@@ -71,7 +72,7 @@ pub(crate) struct Core {
     pub status: Status,
     pub limited: Limited,
     pub guide: Guide,
-    /// Whether a pose was admitted since the last tick.
+    /// Whether a pose was admitted since the last tick, or in this one.
     pub has_followed: bool,
     pub warned: bool,
     pub over_current_ticks: [u8; 3],
@@ -180,9 +181,7 @@ impl Core {
             // What the sensor of an open bridge reads is no current.
             thermal.take(if is_open { Current::ZERO } else { current });
         }
-        if !self.has_followed {
-            self.take_turn(sample);
-        }
+        self.take_turn(sample);
         let motion = self.estimate(sample);
         self.watch(sample);
         self.bridge_missing_targets();
@@ -200,6 +199,7 @@ impl Core {
         self.forget_warnings();
         self.report();
         self.end_warnings();
+        self.has_followed = false;
         drives
     }
 
@@ -229,7 +229,7 @@ impl Core {
                 Ok(motion) => {
                     let motion = found.insert(motion);
                     self.pose = motion.direct.rotation.to_pose();
-                    if !self.has_followed {
+                    if self.spare() != Spare::Nothing {
                         self.find_residual();
                     }
                 }
@@ -344,10 +344,9 @@ impl Core {
         self.share(motion, moment, &bounds)
     }
 
-    /// Takes the friction of the motors as the reference turns them, every fourth tick but those of a
-    /// target. Their speed is that of the motors' angles since the last time.
+    /// Takes the friction of the motors as the reference turns them, where the tick has time. Their speed is that of the motors' angles since the last time.
     fn compensate(&mut self, reference: &Pose) {
-        if self.turn & 3 != 0 || self.has_followed {
+        if self.spare() != Spare::Friction {
             return;
         }
         let found = self.settings.wrist.inverse(reference).ok();

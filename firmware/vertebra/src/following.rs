@@ -9,6 +9,7 @@ use crate::command::{BRIDGED_PERIODS, Received};
 use crate::core::Core;
 use crate::machine::Outcome;
 use crate::settings::Settings;
+use crate::spare::Spare;
 use crate::spline::Spline;
 use crate::workspace::{Guide, Limited};
 
@@ -67,11 +68,9 @@ impl Core {
         }
     }
 
-    /// Searches on for the poses that are nearest to targets out of reach, in the ticks between them.
+    /// Searches on for the poses that are nearest to targets out of reach, in the ticks that have time.
     pub fn search_on(&mut self) {
-        // Nor in those that have something else to do.
-        let is_busy = self.turn & 3 == 0 || self.turn < 4;
-        if !core::mem::take(&mut self.has_followed) && !is_busy {
+        if self.spare() == Spare::Search {
             self.guide.advance(&self.settings.wrist);
         }
     }

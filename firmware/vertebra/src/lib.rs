@@ -35,6 +35,7 @@ mod pushing;
 mod records;
 mod served;
 mod settings;
+mod spare;
 mod spline;
 pub mod store;
 mod storing;

@@ -9,10 +9,8 @@ use crate::command::TARGET_TIMEOUT;
 use crate::core::Core;
 use crate::encoder::Encoder;
 use crate::io::{Drive, Sample};
-use crate::limits::Standing;
 use crate::machine::STOP_DAMPED;
-use crate::settings::Settings;
-use crate::thermal::{FAULT_MARGIN, Thermal};
+use crate::thermal::Thermal;
 use crate::workspace::is_believable;
 
 /// Ticks for which a current may be above its hard limit.
@@ -44,28 +42,6 @@ impl Core {
         self.status = self
             .status
             .with(Condition::Latched, self.machine.state().is_latched());
-    }
-
-    /// Does what need not be done in each tick, a part in each but those that a target makes long
-    /// already: brings one motor's temperature and what follows from it up to date.
-    pub fn take_turn(&mut self, sample: &Sample) {
-        self.turn = self.turn.wrapping_add(1) & 31;
-        let Some(motor) = usize::from(self.turn).checked_sub(1) else {
-            return;
-        };
-        let (Some(thermal), Some(standing), Some(is_too_hot), Some(housing)) = (
-            self.thermal.get_mut(motor),
-            self.standing.get_mut(motor),
-            self.is_too_hot.get_mut(motor),
-            sample.motor_temperature.get(motor),
-        ) else {
-            return;
-        };
-        let Settings { limits, motor, .. } = &self.settings;
-        thermal.advance(self.now, motor, *housing);
-        *is_too_hot = thermal.winding() >= motor.thermal.winding_limit + FAULT_MARGIN;
-        let torque = self.electrical.torque(thermal.bound(motor));
-        *standing = Standing::new(limits, sample.board_temperature, *housing, torque);
     }
 
     /// Notes what stands against enabling.
