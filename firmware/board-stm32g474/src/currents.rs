@@ -19,7 +19,7 @@ use crate::{bridges, liveness, power};
 
 /// nA per step of the ADC: 3.3 V / 4096 over 5 mΩ · 50. The range is ±6.6 A: beyond 4.1 A, which the
 /// supply drives through a stalled motor, and 3.75 A, at which the vertebra sees an over-current.
-const NANOAMPS_PER_STEP: i64 = 3_222_656;
+pub const NANOAMPS_PER_STEP: i64 = 3_222_656;
 /// mV at the end of the ADC's range: 3.3 V · 11.
 const SUPPLY_RANGE: u32 = 36_300;
 const STEPS: u32 = 4_096;

@@ -31,9 +31,10 @@
 //! The break input of TIM1 forces all PWM low without the CPU, which brakes the motors; the next
 //! control tick puts the bridges to sleep. A stopped crystal, a locked-up CPU and a flash error do the
 //! same inside the chip. A control tick that is 5 ms late finds the bridges switched off by the 20 kHz
-//! interrupt, and a fault. That interrupt, of the converter, is also where the current loop runs. Reset, a panic, a fault of the CPU and the watchdog leave the wake pins low:
-//! the motors are free; after each but the power's and the reset pin's reset the vertebra is stopped
-//! until the head has sent a fault reset. So it is when a programmer has started the image.
+//! interrupt of the converter, where the current loop runs too, and a fault. Reset, a panic, a fault of
+//! the CPU and the watchdog leave the wake pins low: the motors are free; after each but the power's and
+//! the reset pin's reset the vertebra is stopped until the head has sent a fault reset. So it is when a
+//! programmer has started the image.
 //!
 //! Settings and a node id given by LSS are kept in the last 4 KB of the flash, see `storage.rs`; option
 //! bit DBANK must be 1, as it leaves the factory.

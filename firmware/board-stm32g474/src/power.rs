@@ -11,12 +11,13 @@ use embassy_stm32::peripherals::TIM1;
 use embassy_stm32::timer::simple_pwm::SimplePwmChannel;
 
 use crate::bridges;
+use crate::currents::NANOAMPS_PER_STEP;
 
 /// One bridge.
 pub type Motor = Bridge<SimplePwmChannel<'static, TIM1>, Pin<'static>, Pin<'static>>;
 
-/// µA per sixteenth of a step of the converter, Q20: 201.416.
-const MICROAMPS_Q20: i32 = 211_200_000;
+/// µA per sixteenth of a step of the converter, Q20.
+const MICROAMPS_Q20: i32 = ((NANOAMPS_PER_STEP << 16) / 1_000) as i32;
 /// Sixteenths of a step.
 pub const FRACTIONS: u32 = 16;
 

@@ -91,6 +91,11 @@ impl Config {
             led,
         }
     }
+
+    /// Tells whether a vertebra is led.
+    const fn leads(&self, id: NodeId) -> bool {
+        self.led & (1 << id.index()) != 0
+    }
 }
 
 /// What the head is doing.
@@ -154,7 +159,7 @@ impl Head {
         let Some(node) = cob.node().and_then(NodeId::new) else {
             return;
         };
-        let is_led = self.leads(node);
+        let is_led = self.config.leads(node);
         let Some(tracker) = self.trackers.get_mut(node.index()).filter(|_| is_led) else {
             return;
         };
@@ -236,10 +241,6 @@ impl Head {
         }
     }
 
-    const fn leads(&self, id: NodeId) -> bool {
-        self.config.led & (1 << id.index()) != 0
-    }
-
     /// Acknowledges the stops that are latched now. Whoever calls it knows that moving is safe.
     pub fn reset(&mut self) {
         for tracker in &mut self.trackers {
@@ -303,11 +304,11 @@ impl Head {
         if self.none_is_driven() {
             self.events.push(Event::Stopped);
         }
-        if NodeId::all().all(|id| self.leads(id)) {
+        let config = self.config;
+        if NodeId::all().all(|id| config.leads(id)) {
             self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, 0]);
         } else {
-            let led = self.config.led;
-            for id in NodeId::all().filter(|id| led & (1 << id.index()) != 0) {
+            for id in NodeId::all().filter(|id| config.leads(*id)) {
                 self.send(Cob::Nmt, &[NMT_PRE_OPERATIONAL, id.get()]);
             }
         }

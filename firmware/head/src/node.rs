@@ -191,12 +191,12 @@ impl Tracker {
                 self.enter(Stage::Latched);
                 events.push(Event::Latched(self.id, state));
             }
-            (Stage::Enabling, state) if state == state_of(self.mode) => {
+            (Stage::Enabling, state) if self.mode.state() == Some(state) => {
                 self.enter(Stage::Running);
                 self.run_since = now;
                 events.push(Event::Running(self.id));
             }
-            (Stage::Running, state) if state == state_of(self.mode) => {}
+            (Stage::Running, state) if self.mode.state() == Some(state) => {}
             (Stage::Enabling, State::Ready) => {}
             (Stage::Latched | Stage::Running | Stage::Enabling, _) => self.enter(Stage::Started),
             _ => {}
@@ -287,19 +287,6 @@ impl Tracker {
             pitch: mix(from.pitch, gait.pitch),
             roll: mix(from.roll, gait.roll),
         }
-    }
-}
-
-/// Returns the state to which a mode leads.
-const fn state_of(mode: Mode) -> State {
-    match mode {
-        Mode::Run => State::Run,
-        Mode::Hold => State::Hold,
-        Mode::Moment => State::Moment,
-        Mode::Motor => State::Motor,
-        Mode::Damped => State::Damped,
-        Mode::Brake => State::Brake,
-        Mode::Off | Mode::FaultReset => State::Ready,
     }
 }
 

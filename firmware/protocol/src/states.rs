@@ -86,6 +86,21 @@ nibble! {
     }
 }
 
+impl Mode {
+    /// Returns the state of a vertebra that is enabled and in the mode; `None` for those that switch off.
+    pub const fn state(self) -> Option<State> {
+        Some(match self {
+            Self::Off | Self::FaultReset => return None,
+            Self::Brake => State::Brake,
+            Self::Damped => State::Damped,
+            Self::Hold => State::Hold,
+            Self::Run => State::Run,
+            Self::Moment => State::Moment,
+            Self::Motor => State::Motor,
+        })
+    }
+}
+
 impl State {
     /// Tells whether a motor may carry current.
     pub const fn is_driven(self) -> bool {

@@ -106,20 +106,12 @@ impl Machine {
             self.enter(now, State::SwitchedOff);
             return Outcome::Reset;
         }
-        let wanted = match mode {
-            Mode::Off | Mode::FaultReset => {
-                self.armed |= mode == Mode::Off;
-                if self.is_enabled() {
-                    self.enter(now, State::Ready);
-                }
-                return Outcome::Done;
+        let Some(wanted) = mode.state() else {
+            self.armed |= mode == Mode::Off;
+            if self.is_enabled() {
+                self.enter(now, State::Ready);
             }
-            Mode::Brake => State::Brake,
-            Mode::Damped => State::Damped,
-            Mode::Hold => State::Hold,
-            Mode::Run => State::Run,
-            Mode::Moment => State::Moment,
-            Mode::Motor => State::Motor,
+            return Outcome::Done;
         };
         if self.is_enabled() || (self.state == State::Ready && self.armed) {
             self.enter(now, wanted);

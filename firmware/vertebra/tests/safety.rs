@@ -5,7 +5,7 @@ use eel_protocol::emergency::Emergency;
 use eel_protocol::{Cob, Condition, Mode, State};
 use eel_vertebra::Drive;
 
-use support::{Bench, faulty, node, pose, stays_off, stopping};
+use support::{Bench, ENABLING, faulty, node, pose, stays_off, stopping};
 
 mod support;
 
@@ -101,14 +101,7 @@ fn bad_targets_before_enabling_do_not_bar_the_way() {
 
 #[test]
 fn a_silent_head_stops_300_ms_after_its_last_heartbeat() {
-    for mode in [
-        Mode::Run,
-        Mode::Hold,
-        Mode::Moment,
-        Mode::Motor,
-        Mode::Damped,
-        Mode::Brake,
-    ] {
+    for mode in ENABLING {
         let mut bench = Bench::enabled(mode);
         let from = bench.millis;
         let last = bench.millis - bench.millis % 100;
@@ -205,14 +198,7 @@ fn an_nmt_stop_latches_a_ready_vertebra_and_leaves_a_stop_in_order() {
 
 #[test]
 fn reset_node_is_off_at_once_in_every_state() {
-    for mode in [
-        Mode::Run,
-        Mode::Hold,
-        Mode::Moment,
-        Mode::Motor,
-        Mode::Damped,
-        Mode::Brake,
-    ] {
+    for mode in ENABLING {
         let mut bench = Bench::enabled(mode);
         bench.nmt(NmtCommand::ResetNode);
         bench.tick();

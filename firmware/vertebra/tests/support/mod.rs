@@ -32,6 +32,16 @@ pub fn radians(angle: Angle) -> f64 {
     f64::from(angle.to_q29()) / f64::from(1 << 29)
 }
 
+/// The modes that enable a vertebra.
+pub const ENABLING: [Mode; 6] = [
+    Mode::Run,
+    Mode::Hold,
+    Mode::Moment,
+    Mode::Motor,
+    Mode::Damped,
+    Mode::Brake,
+];
+
 /// A frame that the vertebra sent, and when.
 #[derive(Clone, Copy, Debug)]
 pub struct Sent {
@@ -343,16 +353,7 @@ pub fn stays_off(bench: &mut Bench) {
     bench.heartbeat = true;
     (bench.stream, bench.sync) = (true, true);
     (bench.damage, bench.counts) = (0, true);
-    for mode in [
-        Mode::Run,
-        Mode::Hold,
-        Mode::Moment,
-        Mode::Motor,
-        Mode::Damped,
-        Mode::Brake,
-        Mode::Off,
-        Mode::Run,
-    ] {
+    for mode in ENABLING.into_iter().chain([Mode::Off, Mode::Run]) {
         bench.mode = mode;
         for _ in 0..60 {
             bench.tick();

@@ -10,7 +10,6 @@ use eel_head::{Config, Task};
 use eel_kinematics::Pose;
 use eel_protocol::{Cob, Frame, Mode, Moment, NodeId};
 use eel_units::{Angle, Torque};
-use serde_json::json;
 
 use super::bus::{self, AnyBus, BusOption, Consent};
 use super::head::{alone, expected, seconds};
@@ -206,20 +205,10 @@ impl Drive {
     }
 
     fn tell(&self, outcome: &Outcome) -> std::io::Result<()> {
-        let elapsed = outcome.elapsed.as_secs_f64();
-        let stopped = if outcome.at_once {
-            "at-once"
-        } else {
-            "in-order"
-        };
         if self.json {
-            let all = json!({
-                "seconds": elapsed, "sync_sent": outcome.syncs, "frames_sent": outcome.sent,
-                "frames_received": outcome.received, "running": outcome.most_running,
-                "late_max_ms": outcome.latest.as_secs_f64() * 1e3, "stopped": stopped,
-            });
-            return writeln!(stdout(), "{all}");
+            return writeln!(stdout(), "{}", outcome.json());
         }
+        let elapsed = outcome.elapsed.as_secs_f64();
         let (there, asked) = (outcome.most_running, self.ids().count());
         writeln!(
             stdout(),

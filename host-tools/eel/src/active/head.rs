@@ -8,7 +8,6 @@ use clap::{Args, ValueEnum};
 use eel_client::Client;
 use eel_head::{Config, Gait, GaitError, Plane};
 use eel_protocol::{HEAD_NODE, NodeId};
-use serde_json::json;
 
 use super::bus::{self, AnyBus, BusOption, Consent};
 use super::live::{Live, Outcome};
@@ -192,12 +191,7 @@ impl Head {
         } = outcome;
         let (elapsed, late) = (elapsed.as_secs_f64(), latest.as_secs_f64() * 1e3);
         if self.json {
-            let all = json!({
-                "seconds": elapsed, "sync_sent": syncs, "frames_sent": sent,
-                "frames_received": received, "running": most_running, "late_max_ms": late,
-                "stopped": if *at_once { "at-once" } else { "in-order" },
-            });
-            return writeln!(stdout(), "{all}");
+            return writeln!(stdout(), "{}", outcome.json());
         }
         let how = if *at_once {
             "ended at once"

@@ -73,6 +73,16 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Returns how it went, for programs.
+    pub fn json(&self) -> serde_json::Value {
+        json!({
+            "seconds": self.elapsed.as_secs_f64(), "sync_sent": self.syncs,
+            "frames_sent": self.sent, "frames_received": self.received,
+            "running": self.most_running, "late_max_ms": self.latest.as_secs_f64() * 1e3,
+            "stopped": if self.at_once { "at-once" } else { "in-order" },
+        })
+    }
+
     /// Tells whether vertebrae swam and stopped in order.
     pub const fn is_fine(&self) -> bool {
         self.troubles == 0 && !self.at_once && self.most_running > 0
