@@ -83,8 +83,8 @@ fn run() -> Result<(), Failure> {
     }
     let taken = meter.read();
     say(format_args!(
-        "{} turns, instructions a turn: {} median where driven, {} mean, {} worst",
-        taken.turns, taken.median, taken.mean, taken.worst
+        "{} turns, instructions a turn: {} median and {} longest where driven, {} mean, {} worst",
+        taken.turns, taken.median, taken.worst_driven, taken.mean, taken.worst
     ));
     Ok(())
 }

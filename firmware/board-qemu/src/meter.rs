@@ -19,6 +19,7 @@ pub struct Meter {
     turns: u64,
     total: u64,
     worst: u64,
+    worst_driven: u64,
     driven: u64,
     /// How many driven turns took so many grains.
     spread: [u32; GRAINS],
@@ -33,6 +34,8 @@ pub struct Reading {
     pub mean: u64,
     /// Instructions that half of the turns in which the motors are driven don't exceed, rounded up to the grain of 64.
     pub median: u64,
+    /// Instructions of the longest turn in which the motors are driven.
+    pub worst_driven: u64,
     /// Instructions of the longest turn.
     pub worst: u64,
 }
@@ -45,12 +48,13 @@ impl Meter {
             turns: 0,
             total: 0,
             worst: 0,
+            worst_driven: 0,
             driven: 0,
             spread: [0; GRAINS],
         }
     }
 
-    /// Does a turn and counts it, for the median only where it is a driven one.
+    /// Does a turn and counts it, with those that are driven where it is one.
     pub fn count<Result>(
         &mut self,
         turn: impl FnOnce() -> Result,
@@ -65,6 +69,7 @@ impl Meter {
             return result;
         }
         self.driven += 1;
+        self.worst_driven = self.worst_driven.max(instructions);
         let grain = (instructions / GRAIN).min(GRAINS as u64 - 1) as usize;
         if let Some(count) = self.spread.get_mut(grain) {
             *count += 1;
@@ -77,6 +82,7 @@ impl Meter {
         Reading {
             turns: self.turns,
             mean: self.total / self.turns.max(1),
+            worst_driven: self.worst_driven,
             worst: self.worst,
             median: self.median(),
         }
