@@ -80,6 +80,8 @@ pub struct Client<'a> {
 
 impl<'a> Client<'a> {
     pub fn new(bench: &'a mut Bench, fates: &'a [Fate]) -> Self {
+        // What came before, an abort of the transfer before it, say, is no answer to anything it asks.
+        bench.sent();
         Self {
             bench,
             fates,
