@@ -11,7 +11,8 @@ use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use eel_head::{Gait, GaitError, Plane};
 use eel_protocol::{NodeId, VERTEBRAE};
-use hil_sim::{checks, swim};
+use hil_sim::{checks, reactions, swim};
+use indicatif::ProgressBar;
 
 /// Simulates the eel: ten vertebrae with their real firmware logic, the CAN bus, the water.
 #[derive(Parser)]
@@ -69,6 +70,8 @@ struct NodeList(Vec<NodeId>);
 enum Command {
     /// Ten vertebrae boot, are started by the head, swim, and are stopped in order
     Swim(SwimArgs),
+    /// Injects faults into a swimming eel and measures how soon each vertebra reacts
+    Reactions(ReactionArgs),
     /// Compares the plant with what is known exactly: energy, added mass, glide, rest
     Check(CheckArgs),
 }
@@ -104,6 +107,19 @@ struct SwimArgs {
     #[arg(long, value_name = "FILE", requires = "qemu")]
     image: Option<PathBuf>,
     /// Print one JSON object instead of the table, and no progress bar
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Args)]
+struct ReactionArgs {
+    /// How often each kind of fault is measured, rounded up to tens [1 to 100000]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    cases: u32,
+    /// Seed of moments, motors and sizes; equal seeds give equal tables
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Print one JSON object instead of the tables, and no progress bar
     #[arg(long)]
     json: bool,
 }
@@ -152,6 +168,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match (&cli.command, &cli.live.can) {
         (Some(Command::Swim(args)), _) => run_swim(args),
+        (Some(Command::Reactions(args)), _) => run_reactions(args),
         (Some(Command::Check(args)), _) => run_checks(args),
         (None, Some(interface)) => run_live(interface, &cli.live),
         (None, None) if cli.live.is_used() => Err(anyhow::anyhow!(
@@ -266,6 +283,27 @@ fn gait(args: &SwimArgs) -> anyhow::Result<Gait> {
             GaitError::Wavelength => "--wavelength must be 0.2 to 3 body lengths",
         })
     })
+}
+
+/// Measures the reactions and tells whether every promise was kept.
+fn run_reactions(args: &ReactionArgs) -> anyhow::Result<bool> {
+    let options = reactions::Options {
+        cases: args.cases,
+        seed: args.seed,
+    };
+    let bar = if args.json {
+        ProgressBar::hidden()
+    } else {
+        ProgressBar::new(reactions::CLASSES.len() as u64)
+    };
+    let report = reactions::run(&options, |done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    if args.json {
+        write(format_args!("{}\n", serde_json::to_string(&report)?))?;
+    } else {
+        write(format_args!("{report}"))?;
+    }
+    Ok(report.passed)
 }
 
 /// Runs the plant's checks and tells whether all passed.

@@ -19,7 +19,7 @@ use eel_tests::skip;
 use eel_units::{Angle, Instant as Moment, Voltage};
 use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, Output, Start};
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Drive, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Keepsake, Settings, Vertebra, turn};
 use hil_sim::bus::Event as BusEvent;
 use hil_sim::plant::Plant;
 use hil_sim::robot::{Config, Node, Observer, Robot, Turn};
@@ -150,6 +150,7 @@ fn spoil(inputs: Vec<Input>, node: NodeId) -> Vec<Step> {
         node,
         serial: SERIAL,
         now: first,
+        failed: false,
     })];
     for (index, mut input) in inputs.into_iter().enumerate() {
         if OUT_OF_WORKSPACE.contains(&index) {
@@ -177,6 +178,7 @@ fn spoil(inputs: Vec<Input>, node: NodeId) -> Vec<Step> {
                 node,
                 serial: SERIAL,
                 now: input.now,
+                failed: true,
             }));
         }
         if GARBAGE.contains(&index) || index >= SECOND_START {
@@ -238,12 +240,18 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
     let mut vertebra = None;
     // Outlives a start, as the image's does.
     let mut store = Store::new(RamFlash::new());
+    let mut kept = Keepsake::EMPTY;
     let mut outputs = Vec::new();
     for step in script {
         match step {
             Step::Start(start) => {
                 let settings = Settings::prototype(start.node, start.serial);
-                vertebra = Some(Vertebra::with_stored(settings, &store.load(), start.now));
+                let (stored, now) = (store.load(), start.now);
+                vertebra = Some(if start.failed {
+                    Vertebra::after_failure(settings, &stored, &kept, now)
+                } else {
+                    Vertebra::with_stored(settings, &stored, now)
+                });
             }
             Step::Turn(input) => {
                 let vertebra = vertebra.as_mut().expect("started");
@@ -260,6 +268,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                         .expect("room for what was asked for");
                 });
                 store::serve(vertebra, &mut store, input.now);
+                kept = vertebra.poll_keepsake().unwrap_or(kept);
                 outputs.push(output);
             }
         }

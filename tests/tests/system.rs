@@ -2,10 +2,14 @@
 
 #[path = "system/client.rs"]
 mod client;
+#[path = "system/defects.rs"]
+mod defects;
 #[path = "system/faults.rs"]
 mod faults;
 #[path = "system/friction.rs"]
 mod friction;
+#[path = "system/reactions.rs"]
+mod reactions;
 #[path = "system/swim.rs"]
 mod swim;
 #[path = "system/watch.rs"]

@@ -3,7 +3,7 @@
 use cortex_m_semihosting::debug;
 use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Drive, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Keepsake, Settings, Vertebra, turn};
 
 use crate::console::{leave, say};
 use crate::meter::Meter;
@@ -52,6 +52,7 @@ fn run() -> Result<(), Failure> {
     let mut output = Pipe::create(c"lockstep.out")?;
     let mut vertebra = None;
     let mut store = Store::new(RamFlash::new());
+    let mut kept = Keepsake::EMPTY;
     let mut body = [0; MAX_PACKET - HEADER];
     loop {
         let mut header = [0; HEADER];
@@ -65,9 +66,14 @@ fn run() -> Result<(), Failure> {
         }
         match (kind, &mut vertebra) {
             (Kind::Start, _) => {
-                let lockstep::Start { node, serial, now } = lockstep::Start::decode(body)?;
-                let settings = Settings::prototype(node, serial);
-                vertebra = Some(Vertebra::with_stored(settings, &store.load(), now));
+                let start = lockstep::Start::decode(body)?;
+                let settings = Settings::prototype(start.node, start.serial);
+                let (stored, now) = (store.load(), start.now);
+                vertebra = Some(if start.failed {
+                    Vertebra::after_failure(settings, &stored, &kept, now)
+                } else {
+                    Vertebra::with_stored(settings, &stored, now)
+                });
             }
             (Kind::Input, Some(vertebra)) => {
                 let given = lockstep::Input::decode(body)?;
@@ -75,6 +81,7 @@ fn run() -> Result<(), Failure> {
                 let work = || answer(vertebra, &given, &mut frames);
                 let drives = meter.count(work, is_driven);
                 store::serve(vertebra, &mut store, given.now);
+                kept = vertebra.poll_keepsake().unwrap_or(kept);
                 let made = lockstep::Output { drives, frames };
                 output.write_all(made.encode().as_bytes())?;
             }

@@ -12,7 +12,7 @@ mod image {
     use eel_head::{Config, Gait, Head, Plane};
     use eel_protocol::{Frame, NodeId};
     use eel_vertebra::store::{self, RamFlash, Store};
-    use eel_vertebra::{Settings, Vertebra, lockstep, turn};
+    use eel_vertebra::{KEEPSAKE_BYTES, Keepsake, Settings, Vertebra, lockstep, turn};
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
@@ -20,14 +20,15 @@ mod image {
         let Some(node) = NodeId::new(black_box(1)) else {
             cortex_m::asm::udf();
         };
-        let start = if black_box(false) {
-            Vertebra::after_failure
-        } else {
-            Vertebra::with_stored
-        };
         let mut store = black_box(Store::new(RamFlash::new()));
         let settings = black_box(Settings::prototype(node, 1));
-        let mut vertebra = start(settings, &store.load(), now);
+        let stored = store.load();
+        let mut vertebra = if black_box(false) {
+            let kept = Keepsake::from_bytes(black_box([0; KEEPSAKE_BYTES]));
+            Vertebra::after_failure(settings, &stored, &kept, now)
+        } else {
+            Vertebra::with_stored(settings, &stored, now)
+        };
         let (amplitude, wavelength) = black_box((800, 8_000));
         let Ok(gait) = Gait::new(
             black_box(1_000),
@@ -74,6 +75,7 @@ mod image {
             vertebra.nmt_state(),
             vertebra.node_id(),
         ));
+        black_box(vertebra.poll_keepsake().as_ref().map(Keepsake::as_bytes));
         vertebra.note_loop_time(black_box(eel_units::Duration::ZERO));
         vertebra.note_overruns(black_box(0), black_box(0));
         while let Some(event) = vertebra.poll_event() {

@@ -6,7 +6,7 @@ use eel_drivers::Orientation;
 use eel_protocol::NodeId;
 use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::store::{StoreError, Stored};
-use eel_vertebra::{Event, Identifiers, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Event, Identifiers, Keepsake, Sample, Settings, Vertebra, turn};
 use embassy_stm32::can::Properties;
 use embassy_time::{Duration, Instant, Ticker};
 
@@ -14,7 +14,7 @@ use crate::bridges::{self, Bridges};
 use crate::currents::{self, Currents};
 use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
-use crate::{bus, liveness, storage};
+use crate::{bus, failure, liveness, power, storage};
 
 /// How the motors and their encoders are built in. The one table of signs: [`measure`] turns what
 /// comes from the sensors by it, the current loop in `power.rs` what goes to the bridges.
@@ -42,6 +42,8 @@ pub struct Birth {
     pub stored: Stored,
     /// What led to the start.
     pub cause: Start,
+    /// What was remembered of before.
+    pub kept: Keepsake,
 }
 
 /// Runs the vertebra; after a failure it stays stopped until the head has sent a fault reset.
@@ -68,10 +70,11 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         settings,
         stored,
         cause,
+        kept,
     } = birth;
     let mut vertebra = match cause {
         Start::Ordered => Vertebra::with_stored(settings, &stored, now()),
-        Start::Failed => Vertebra::after_failure(settings, &stored, now()),
+        Start::Failed => Vertebra::after_failure(settings, &stored, &kept, now()),
     };
     let mut heard = Identifiers::new();
     loop {
@@ -96,6 +99,9 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         }
         report(&mut vertebra);
         store(&mut vertebra);
+        if let Some(keepsake) = vertebra.poll_keepsake() {
+            failure::remember(&keepsake);
+        }
         let (received, transmitted) = bus::overruns();
         vertebra.note_overruns(received, transmitted);
         let micros = u32::try_from(start.elapsed().as_micros()).unwrap_or(u32::MAX);
@@ -130,6 +136,7 @@ fn measure(
         board_temperature,
         motor_temperature,
         bridge_fault: from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
+        over_current: power::tripped(),
         emergency_stop: bridges.take_emergency_stop(),
     }
 }

@@ -6,6 +6,7 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use cortex_m_rt::{ExceptionFrame, exception};
+use eel_vertebra::{KEEPSAKE_BYTES, Keepsake};
 use embassy_stm32::pac;
 
 use crate::bridges;
@@ -48,6 +49,27 @@ static KEPT: Kept = Kept(UnsafeCell::new(Note {
     line: 0,
     address: 0,
 }));
+
+/// What the vertebra wants to be remembered, in the same kind of memory.
+struct Remembered(UnsafeCell<[u8; KEEPSAKE_BYTES]>);
+
+// SAFETY: read once before any interrupt, then written by the control tick alone.
+unsafe impl Sync for Remembered {}
+
+#[unsafe(link_section = ".uninit.keepsake")]
+static REMEMBERED: Remembered = Remembered(UnsafeCell::new([0; KEEPSAKE_BYTES]));
+
+/// Returns what the vertebra remembers; call it before the control tick runs.
+pub fn remembered() -> Keepsake {
+    // SAFETY: any bits are bytes, and nothing else runs yet.
+    Keepsake::from_bytes(unsafe { ptr::read_volatile(REMEMBERED.0.get()) })
+}
+
+/// Remembers this from now on; only the control tick may call it.
+pub fn remember(keepsake: &Keepsake) {
+    // SAFETY: nobody else touches it while interrupts are on. A failure meanwhile spoils its check.
+    unsafe { ptr::write_volatile(REMEMBERED.0.get(), *keepsake.as_bytes()) };
+}
 
 /// Finds out and logs what led to this start, and clears the signs of it.
 ///

@@ -127,6 +127,7 @@ fn start(p: Peripherals, cause: failure::Start) -> Storage {
         settings,
         stored,
         cause,
+        kept: failure::remembered(),
     };
     spawn(&control, control::run(hardware, birth));
     spawn(&slow, slow::run(thermistors, watchdog));

@@ -56,6 +56,13 @@ pub fn set(drives: &[Drive; 3], supply: Voltage) {
     with(|power| power.set(drives, supply));
 }
 
+/// Tells which bridges the loop has switched off.
+pub fn tripped() -> [bool; 3] {
+    let mut tripped = [false; 3];
+    with(|power| tripped = power.current_loop.tripped());
+    tripped
+}
+
 /// Lets go of the bridges, whose control tick is missing.
 pub fn stop() {
     with(|power| power.set(&[Drive::Off; 3], Voltage::from_millivolts(0)));
@@ -104,11 +111,15 @@ impl Power {
         ];
         let decided = self.current_loop.update(measured);
         let built = self.motors.iter_mut().zip(self.orientations);
-        for ((motor, orientation), switching) in built.zip(decided) {
-            // The others are as the control tick left them.
-            if let Switching::Duty(duty) = switching
-                && motor.apply(orientation.output(Output::Duty(duty))).is_err()
-            {
+        let tripped = self.current_loop.tripped();
+        for (((motor, orientation), switching), tripped) in built.zip(decided).zip(tripped) {
+            let output = match switching {
+                Switching::Duty(duty) => orientation.output(Output::Duty(duty)),
+                Switching::Off if tripped => Output::Off,
+                // The others are as the control tick left them.
+                Switching::Off | Switching::Brake => continue,
+            };
+            if motor.apply(output).is_err() {
                 bridges::force_off();
             }
         }

@@ -75,7 +75,6 @@ pub(crate) struct Core {
     /// Whether a pose was admitted since the last tick, or in this one.
     pub has_followed: bool,
     pub warned: bool,
-    pub over_current_ticks: [u8; 3],
     pub lost_ticks: u8,
     pub feed_since: Instant,
     pub effort: Effort,
@@ -134,7 +133,6 @@ impl Core {
             guide: Guide::default(),
             has_followed: false,
             warned: false,
-            over_current_ticks: [0; 3],
             lost_ticks: 0,
             feed_since: now,
             effort: Effort {

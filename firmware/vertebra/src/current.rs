@@ -120,6 +120,8 @@ pub struct CurrentLoop {
     supply: i32,
     /// Q15 duty per unit, Q28.
     duty_per_unit: i32,
+    /// The current at which a bridge is switched off.
+    hard_limit: Current,
 }
 
 /// Gains in units per µA, Q32; the last in units per unit.
@@ -139,6 +141,8 @@ struct Channel {
     feed: i32,
     /// Units.
     integral: i32,
+    /// Whether the current passed its hard limit since the bridge was last told to be off.
+    tripped: bool,
 }
 
 impl Channel {
@@ -146,6 +150,7 @@ impl Channel {
         drive: Drive::Off,
         feed: 0,
         integral: 0,
+        tripped: false,
     };
 }
 
@@ -165,7 +170,13 @@ impl CurrentLoop {
             channels: [Channel::OFF; 3],
             supply: 0,
             duty_per_unit: 0,
+            hard_limit: hard_limit(motor.current_limit),
         }
+    }
+
+    /// Tells whose current passed the hard limit: that bridge is off until it is told to be.
+    pub fn tripped(&self) -> [bool; 3] {
+        self.channels.each_ref().map(|channel| channel.tripped)
     }
 
     /// Takes what a control tick decides and the supply that it measured.
@@ -177,6 +188,7 @@ impl CurrentLoop {
         self.duty_per_unit = ((32_767 << 16) / supply) << 8;
         for (channel, drive) in self.channels.iter_mut().zip(drives) {
             match drive {
+                Drive::Current(_) if channel.tripped => {}
                 Drive::Current(Setpoint { current, emf }) => {
                     channel.drive = *drive;
                     let drop = multiply_high(current.to_microamps(), self.gains.resistance);
@@ -206,6 +218,13 @@ impl CurrentLoop {
             *switching = match channel.drive {
                 Drive::Off => Switching::Off,
                 Drive::Brake => Switching::Brake,
+                Drive::Current(_) if measured.abs() > self.hard_limit => {
+                    *channel = Channel {
+                        tripped: true,
+                        ..Channel::OFF
+                    };
+                    Switching::Off
+                }
                 Drive::Current(Setpoint { current, .. }) => {
                     let error = current - measured;
                     let voltage = channel.advance(&self.gains, self.supply, error);
@@ -238,6 +257,12 @@ impl Channel {
             .max(-supply);
         held
     }
+}
+
+/// Returns the current that is out of hand: half as much again as the bridge is ever told.
+pub const fn hard_limit(limit: Current) -> Current {
+    let limit = limit.to_microamps();
+    Current::from_microamps(limit.saturating_add(limit / 2))
 }
 
 const fn within(value: u32, (least, most): (u32, u32)) -> u32 {

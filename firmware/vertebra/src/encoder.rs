@@ -8,7 +8,7 @@ use crate::settings::Motor;
 const ALIGN_SAMPLES: u32 = 256;
 /// Largest difference between absolute and counted angle that is still plausible: 20 mrad.
 const DISAGREEMENT: i64 = (20 << 29) / 1_000;
-/// Implausible readings in a row that make a fault.
+/// Absolute angles in a row that part from the counted ones and make a fault; a jump of the count does at once.
 const IMPLAUSIBLE_LIMIT: u8 = 5;
 /// Invalid absolute readings in a row that make a fault: 50 ms.
 const INVALID_LIMIT: u8 = 50;
@@ -121,11 +121,14 @@ impl Encoder {
                 false
             }
         };
-        self.implausible = if jumped || parted {
-            self.implausible.saturating_add(1)
-        } else {
-            0
-        };
+        if jumped {
+            // The angle is wrong from now on: no reading will mend it.
+            self.implausible = IMPLAUSIBLE_LIMIT;
+        } else if parted {
+            self.implausible = self.implausible.saturating_add(1);
+        } else if self.implausible < IMPLAUSIBLE_LIMIT {
+            self.implausible = 0;
+        }
         self.verdict()
     }
 
@@ -268,15 +271,27 @@ mod tests {
     }
 
     #[test]
-    fn reports_a_jump_only_when_it_stays_implausible() {
+    fn reports_a_jump_of_the_count_at_once_and_for_good() {
         let mut encoder = aligned();
-        for step in 1..=4 {
-            assert_eq!(
-                encoder.update(7_000 + step * 5_000, Some(Angle::MAX)),
-                Ok(())
-            );
+        let there = Some(Angle::from_milliradians(300));
+        for count in [7_600, 7_600, 7_000] {
+            let verdict = encoder.update(count, there);
+            assert_eq!(verdict, Err(EncoderFault::Implausible), "{count}");
         }
-        let verdict = encoder.update(27_000 + 5_000, Some(Angle::MAX));
+    }
+
+    #[test]
+    fn reports_an_absolute_angle_only_when_it_stays_elsewhere() {
+        let mut encoder = aligned();
+        let there = Some(Angle::from_milliradians(300));
+        let elsewhere = Some(Angle::from_milliradians(330));
+        for angle in [elsewhere, elsewhere, elsewhere, elsewhere, there] {
+            assert_eq!(encoder.update(7_000, angle), Ok(()));
+        }
+        for _ in 0..4 {
+            assert_eq!(encoder.update(7_000, elsewhere), Ok(()));
+        }
+        let verdict = encoder.update(7_000, elsewhere);
         assert_eq!(verdict, Err(EncoderFault::Implausible));
     }
 

@@ -17,10 +17,16 @@ pub(crate) struct Clock {
 
 impl Core {
     /// Keeps what the vertebra was doing, in the tick in which it faults or stops; `before` is the state
-    /// that this ends. Measurements are this tick's, reference and limits those that were in force.
-    #[inline(never)] // One copy in flash.
+    /// that this ends.
     pub fn freeze(&mut self, before: State, emergency: Emergency, source: Source) {
         self.raised = true;
+        self.freeze = Some(self.frame(before, emergency, source));
+    }
+
+    /// Returns what the vertebra is doing. Measurements are this tick's, reference and limits those that
+    /// were in force.
+    #[inline(never)] // One copy in flash.
+    pub fn frame(&self, before: State, emergency: Emergency, source: Source) -> FreezeFrame {
         let count = self.freeze.map_or(0, |frame| frame.count);
         let clock = self.clock.map(|Clock { time, told }| {
             let now = self.now.to_micros();
@@ -64,7 +70,7 @@ impl Core {
                 .current
                 .map(|current| self.electrical.torque(current).to_millinewton_metres());
         }
-        self.freeze = Some(frame);
+        frame
     }
 }
 

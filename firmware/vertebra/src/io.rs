@@ -19,6 +19,8 @@ pub struct Sample {
     pub motor_temperature: [Temperature; 3],
     /// Whether a bridge reports a fault.
     pub bridge_fault: [bool; 3],
+    /// Whether the current loop has switched a bridge off, [`CurrentLoop::tripped`](crate::CurrentLoop::tripped).
+    pub over_current: [bool; 3],
     /// Whether the emergency stop line is asserted.
     pub emergency_stop: bool,
 }

@@ -14,7 +14,7 @@ use heapless::Vec;
 use crate::io::{Drive, Sample, Setpoint};
 
 /// The layout; another one has another number.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 /// The most frames of a packet: more than a node queues.
 pub const MAX_FRAMES: usize = 32;
 /// Length of a header in bytes.
@@ -78,6 +78,8 @@ pub struct Start {
     pub serial: u32,
     /// The time.
     pub now: Instant,
+    /// Whether the microcontroller failed before, so that the vertebra is stopped.
+    pub failed: bool,
 }
 
 /// What a vertebra is given for a turn.
@@ -191,6 +193,7 @@ impl Start {
         packet.put(&[self.node.get()]);
         packet.put(&self.serial.to_le_bytes());
         packet.put(&self.now.to_micros().to_le_bytes());
+        packet.put(&[u8::from(self.failed)]);
         packet.finish()
     }
 
@@ -203,8 +206,18 @@ impl Start {
         let node = NodeId::new(reader.take_u8()?).ok_or(PacketError::Value)?;
         let serial = u32::from_le_bytes(reader.take()?);
         let now = reader.take_instant()?;
+        let failed = match reader.take_u8()? {
+            0 => false,
+            1 => true,
+            _ => return Err(PacketError::Value),
+        };
         reader.finish()?;
-        Ok(Self { node, serial, now })
+        Ok(Self {
+            node,
+            serial,
+            now,
+            failed,
+        })
     }
 }
 
@@ -303,7 +316,7 @@ fn put_sample(packet: &mut Packet, sample: &Sample) {
         packet.put_i32(temperature.to_decidegrees());
     }
     let stop = u8::from(sample.emergency_stop) << 3;
-    packet.put(&[to_bits(sample.bridge_fault) | stop]);
+    packet.put(&[to_bits(sample.bridge_fault) | stop | to_bits(sample.over_current) << 4]);
 }
 
 fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
@@ -330,7 +343,8 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
         supply,
         board_temperature,
         motor_temperature,
-        bridge_fault: from_bits(flags & !(1 << 3))?,
+        bridge_fault: from_bits(flags & 0x07)?,
+        over_current: from_bits(flags >> 4)?,
         emergency_stop: flags & 1 << 3 != 0,
     })
 }

@@ -7,14 +7,13 @@ use eel_units::{Angle, Temperature, Torque};
 
 use crate::command::TARGET_TIMEOUT;
 use crate::core::Core;
+use crate::current::hard_limit;
 use crate::encoder::Encoder;
 use crate::io::{Drive, Sample};
 use crate::machine::STOP_DAMPED;
 use crate::thermal::Thermal;
 use crate::workspace::is_believable;
 
-/// Ticks for which a current may be above its hard limit.
-const OVER_CURRENT_TICKS: u8 = 3;
 /// Largest difference between the measured angles and those of the measured pose: 1 mrad.
 const RESIDUAL_LIMIT: Angle = Angle::from_milliradians(1);
 
@@ -81,7 +80,6 @@ impl Core {
             self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
         }
         if !self.machine.is_live() {
-            self.over_current_ticks = [0; 3];
             return;
         }
         let limits = &self.settings.limits;
@@ -120,22 +118,21 @@ impl Core {
         self.is_too_hot.iter().position(|hot| *hot)
     }
 
-    /// Finds a current that stays far above what the bridge is told never to exceed.
+    /// Finds a current that is far above what the bridge is ever told: the loop has seen it, or its mean
+    /// is, as that of a braked motor may be.
     fn find_over_current(&mut self, sample: &Sample) {
-        let limit = self.settings.motor.current_limit.to_microamps();
-        let hard = limit.saturating_add(limit / 2);
-        let readings = sample.current.into_iter().zip(&mut self.over_current_ticks);
-        for (motor, (current, ticks)) in readings.enumerate() {
-            let magnitude = current.abs().to_microamps();
-            *ticks = if magnitude > hard {
-                ticks.saturating_add(1)
-            } else {
-                0
-            };
-            if *ticks >= OVER_CURRENT_TICKS {
-                let milliamps = (magnitude / 1_000).min(0xFFFF) as u16;
+        let hard = hard_limit(self.settings.motor.current_limit);
+        for (motor, (current, tripped)) in sample
+            .current
+            .into_iter()
+            .zip(sample.over_current)
+            .enumerate()
+        {
+            if tripped || current.abs() > hard {
+                let milliamps = current.abs().to_microamps() / 1_000;
+                let detail = milliamps.min(0xFFFF) as u16;
                 self.pending
-                    .fault(Emergency::OVER_CURRENT, Some(motor), milliamps);
+                    .fault(Emergency::OVER_CURRENT, Some(motor), detail);
             }
         }
     }

@@ -31,6 +31,8 @@ const COLD_START: (i64, i64) = (4, 5);
 const LONGEST_STEP: u32 = 100_000;
 /// Most power that counts, µW.
 const MOST_POWER: i64 = 1_000_000_000;
+/// Length of the temperatures of a motor as bytes.
+pub const HEAT_BYTES: usize = 8;
 /// Range of the temperatures, µ°C: −100 °C to 200 °C; hotter, no winding lasts.
 const RANGE: (i64, i64) = (-100_000_000, 200_000_000);
 
@@ -44,6 +46,8 @@ pub struct Thermal {
     squares: u64,
     count: u32,
     last: Option<Instant>,
+    /// Whether the temperatures are those of before a start.
+    is_warm: bool,
 }
 
 impl Thermal {
@@ -55,6 +59,28 @@ impl Thermal {
             squares: 0,
             count: 0,
             last: None,
+            is_warm: false,
+        }
+    }
+
+    /// Returns the temperatures for a start that follows soon.
+    pub fn to_bytes(self) -> [u8; HEAT_BYTES] {
+        // The range is within 32 bits; before the first step both are 0 and begin anew.
+        let [a, b, c, d] = (self.winding as i32).to_le_bytes();
+        let [e, f, g, h] = (self.housing as i32).to_le_bytes();
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Goes on from temperatures that were kept; of none at all, it begins as ever.
+    pub fn from_bytes([a, b, c, d, e, f, g, h]: [u8; HEAT_BYTES]) -> Self {
+        let (least, most) = RANGE;
+        let warmth = |bytes| i64::from(i32::from_le_bytes(bytes)).clamp(least, most);
+        let (winding, housing) = (warmth([a, b, c, d]), warmth([e, f, g, h]));
+        Self {
+            winding,
+            housing,
+            is_warm: (winding, housing) != (0, 0),
+            ..Self::new()
         }
     }
 
@@ -76,7 +102,9 @@ impl Thermal {
             .contains(&measured)
             .then(|| i64::from(measured) * TENTH);
         let Some(last) = self.last.replace(now) else {
-            self.begin(data, measured);
+            if !self.is_warm {
+                self.begin(data, measured);
+            }
             return;
         };
         let step = i64::from(

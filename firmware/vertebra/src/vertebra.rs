@@ -3,21 +3,23 @@
 use eel_canopen::{Config, Frame, Identifiers, Identity, NmtCommand, NmtState, Node};
 use eel_kinematics::Pose;
 use eel_protocol::emergency::{Emergency, Source};
-use eel_protocol::freeze::TimeOfDay;
+use eel_protocol::freeze::{FreezeFrame, TimeOfDay};
 use eel_protocol::{
     Cob, ERROR_BEHAVIOUR, HEAD_HEARTBEAT_TIMEOUT_MS, HEAD_NODE, NodeId, State, Status,
 };
 use eel_protocol::{SYNC_COUNTER_OVERFLOW, VERTEBRA_HEARTBEAT_MS, VERTEBRAE, identity, pdo};
-use eel_units::{Angle, Duration, Instant};
+use eel_units::{Angle, Duration, Instant, Temperature};
 
 use crate::core::Core;
 use crate::events::Event;
 use crate::freezing::Clock;
 use crate::io::{Drive, Sample};
+use crate::keepsake::{Keepsake, Kept};
 use crate::records::Records;
 use crate::served::Served;
 use crate::settings::Settings;
 use crate::store::{Record, Stored};
+use crate::thermal::Thermal;
 
 /// One vertebra: frames and samples in, drives and frames out.
 #[derive(Clone, Debug)]
@@ -28,6 +30,7 @@ pub struct Vertebra {
     /// What the platform made it with, before what is stored.
     settings: Settings,
     pub(crate) storing: Storing,
+    pub(crate) kept: Kept,
 }
 
 /// What NMT "reset node" goes back to, and what is to become it.
@@ -98,6 +101,7 @@ impl Vertebra {
                 stored: record,
                 ..Storing::default()
             },
+            kept: Kept::default(),
         };
         vertebra.core.settings_lost = is_damaged || is_refused;
         vertebra.take_settings();
@@ -105,10 +109,15 @@ impl Vertebra {
     }
 
     /// Starts a vertebra whose microcontroller ended by a watchdog, a panic or a fault: as at
-    /// power-up, but stopped until a fault reset.
-    pub fn after_failure(settings: Settings, stored: &Stored, now: Instant) -> Self {
+    /// power-up, but stopped until a fault reset, and with what was kept of before.
+    pub fn after_failure(
+        settings: Settings,
+        stored: &Stored,
+        kept: &Keepsake,
+        now: Instant,
+    ) -> Self {
         let mut vertebra = Self::with_stored(settings, stored, now);
-        vertebra.core.emergency_stop(Emergency::RESTARTED);
+        vertebra.core.restart(kept);
         vertebra
     }
 
@@ -187,6 +196,16 @@ impl Vertebra {
     /// Returns the angle of each motor.
     pub fn motor_angles(&self) -> [Angle; 3] {
         self.core.angles()
+    }
+
+    /// Returns what was kept of the last fault or stop.
+    pub fn freeze_frame(&self) -> Option<FreezeFrame> {
+        self.core.freeze
+    }
+
+    /// Returns how warm each motor's winding is by the model.
+    pub fn winding_temperatures(&self) -> [Temperature; 3] {
+        self.core.thermal.each_ref().map(Thermal::winding)
     }
 
     /// Returns how many targets since power-up the counter shows to have been lost on the way: never

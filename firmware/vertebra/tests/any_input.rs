@@ -287,6 +287,7 @@ fn sample(random: &mut Random) -> Sample {
         motor_temperature: [300; 3]
             .map(|ordinary| Temperature::from_decidegrees(any(random, ordinary))),
         bridge_fault: [false; 3].map(|_| random.once_in(12)),
+        over_current: [false; 3].map(|_| random.once_in(12)),
         emergency_stop: random.once_in(12),
     }
 }

@@ -53,7 +53,7 @@ fn still(mode: Mode, at: Pose) -> Bench {
     bench.download(0x1401, 1, &id.to_le_bytes()).unwrap();
     bench.operate();
     bench.follows = false;
-    bench.pose = at;
+    bench.move_to(at, 100);
     // The observer comes to rest.
     bench.run(100);
     bench.mode = mode;

@@ -7,8 +7,8 @@ use eel_kinematics::Pose;
 use eel_protocol::emergency::Emergency;
 use eel_protocol::{Frame, Mode, Moment, State};
 use eel_units::{Angle, Current, Torque};
-use eel_vertebra::Vertebra;
 use eel_vertebra::store::Stored;
+use eel_vertebra::{Keepsake, Vertebra};
 
 use support::{Bench, node, pose, stays_off};
 
@@ -16,7 +16,8 @@ use support::{Bench, node, pose, stays_off};
 fn a_failure_of_its_processor_needs_a_fault_reset() {
     let mut bench = Bench::new();
     let settings = eel_vertebra::Settings::prototype(node(), 7);
-    bench.vertebra = Vertebra::after_failure(settings, &Stored::Nothing, bench.now());
+    bench.vertebra =
+        Vertebra::after_failure(settings, &Stored::Nothing, &Keepsake::EMPTY, bench.now());
     bench.nmt(NmtCommand::Start);
     bench.run(400);
     assert_eq!(bench.state(), State::StopOff);

@@ -125,8 +125,7 @@ fn a_fast_wrist_is_asked_for_no_more_than_the_supply_drives() {
     windings.bench.follows = false;
     // Somebody yaws the wrist at 12 rad/s towards a target that lies beyond.
     windings.bench.target = pose(500, 0, 0);
-    windings.bench.pose = pose(-500, 0, 0);
-    windings.bench.run(60);
+    windings.bench.move_to(pose(-500, 0, 0), 60);
     let mut least = f64::INFINITY;
     for step in 1..60 {
         windings.bench.pose = pose(-500 + step * 12, 0, 0);
@@ -194,6 +193,7 @@ fn what_drives_and_what_brakes_have_limits_of_their_own() {
         windings.bench.follows = false;
         windings.bench.target = pose(if ahead { 520 } else { -520 }, 0, 0);
         set(&mut windings.bench);
+        windings.bench.move_to(pose(-100, 0, 0), 20);
         let mut torque = [0.0; 3];
         for step in -100..100 {
             windings.bench.pose = pose(step, 0, 0);

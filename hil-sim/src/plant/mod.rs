@@ -12,6 +12,7 @@ pub mod body;
 pub mod chain;
 pub mod checks;
 pub mod config;
+mod defect;
 pub mod gait;
 pub mod integrate;
 pub mod joint;
@@ -32,6 +33,7 @@ use algebra::{Mat3, Vec3};
 use body::JOINTS;
 use chain::{Chain, Load, Motion, Push, State};
 pub use config::Config;
+pub use defect::{Defect, Defects};
 use joint::{Pull, Stops, Target, Tracking};
 pub use view::BodyState;
 use wrist::Wrist;
@@ -163,6 +165,19 @@ impl Plant {
     pub fn sample(&mut self, joint: usize) -> Sample {
         let rotation = self.state.joints[joint].matrix();
         self.wrists[joint].sample(&self.config, &rotation, self.supply_v)
+    }
+
+    /// Returns what is wrong with the hardware of vertebra `joint + 1`.
+    ///
+    /// # Panics
+    /// With a joint beyond 9.
+    pub fn defects_mut(&mut self, joint: usize) -> &mut Defects {
+        self.wrists[joint].defects_mut()
+    }
+
+    /// Sets the battery's voltage without load from now on, V.
+    pub fn set_battery(&mut self, volts: f64) {
+        self.config.supply_v = volts;
     }
 
     /// Sets the forces from outside that act from now on, in place of those before.

@@ -12,6 +12,15 @@ use super::motor::{Bridge, MotorState, Winding};
 /// A step of the board's current converter, µA: 3.3 V / 4096 over 5 mΩ · 50.
 const CONVERTER_STEP_UA: f64 = 3_222.656;
 
+/// What the bridges have, and how wrong they measure.
+#[derive(Clone, Copy, Debug)]
+pub struct Supply {
+    /// Voltage at the bridges.
+    pub volts: f64,
+    /// What each current reads too much, A.
+    pub wrong_a: [f64; 3],
+}
+
 /// The bridges of three motors.
 #[derive(Clone, Debug)]
 pub struct Power {
@@ -38,29 +47,34 @@ impl Power {
         &mut self,
         motor: &Motor,
         drives: &[Drive; 3],
-        supply_v: f64,
+        supply: &Supply,
         speeds: &[f64; 3],
         motors: &mut [MotorState; 3],
         step: f64,
     ) -> [Bridge; 3] {
         let is_driven = drives.map(|drive| matches!(drive, Drive::Current(_)));
         self.drawn_a = [0.0; 3];
+        let (supply_v, wrong_a) = (supply.volts, supply.wrong_a);
         let supply = Voltage::from_millivolts(libm::round(supply_v * 1e3) as i32);
         self.current_loop.set(drives, supply);
         let periods = libm::round(step * f64::from(CURRENT_LOOP_HZ)).max(1.0);
         let mut sums = [0.0; 3];
         if is_driven.contains(&true) {
             for _ in 0..periods as usize {
-                let measured = std::array::from_fn(|i| converted(motors[i].current_a));
+                let measured = std::array::from_fn(|i| converted(motors[i].current_a + wrong_a[i]));
                 let decided = self.current_loop.update(measured);
                 for i in (0..3).filter(|i| is_driven[*i]) {
                     let volts = voltage(self.acting[i], supply_v);
                     let before = motors[i].current_a;
-                    let after = self.winding.advance(motor, before, volts, speeds[i]);
+                    let after = if self.current_loop.tripped()[i] {
+                        0.0
+                    } else {
+                        self.winding.advance(motor, before, volts, speeds[i])
+                    };
                     let mean = 0.5 * (before + after);
                     motors[i].current_a = after;
                     sums[i] += mean;
-                    self.drawn_a[i] += volts * mean / (supply_v * periods);
+                    self.drawn_a[i] += volts * mean / (supply_v.max(1.0) * periods);
                 }
                 self.acting = decided;
             }
@@ -70,6 +84,11 @@ impl Power {
             Drive::Brake => Bridge::Voltage(0.0),
             Drive::Current(_) => Bridge::Current(sums[i] / periods),
         })
+    }
+
+    /// Tells which bridges the loop has switched off.
+    pub fn tripped(&self) -> [bool; 3] {
+        self.current_loop.tripped()
     }
 
     /// Returns the mean current drawn from the battery in the last step, A.
@@ -98,6 +117,11 @@ mod tests {
 
     use super::*;
 
+    const FULL: Supply = Supply {
+        volts: 24.0,
+        wrong_a: [0.0; 3],
+    };
+
     /// Spins a lone motor with a load by the loop for a second, in steps; returns its speed at the end.
     fn spin(step: f64, amps: f64) -> (f64, MotorState) {
         let motor = Motor::default();
@@ -114,7 +138,7 @@ mod tests {
             let drives = [Drive::Current(setpoint), Drive::Off, Drive::Brake];
             for _ in 0..steps_per_tick {
                 let speeds = [speed, 0.0, 0.0];
-                let [bridge, ..] = power.act(&motor, &drives, 24.0, &speeds, &mut motors, step);
+                let [bridge, ..] = power.act(&motor, &drives, &FULL, &speeds, &mut motors, step);
                 let line = super::super::motor::line(&motor, bridge, speed);
                 let push = line.torque - line.slope * speed;
                 speed += step * push / (0.05 + step * line.slope);
@@ -155,7 +179,7 @@ mod tests {
             power.act(
                 &motor,
                 &drives,
-                24.0,
+                &FULL,
                 &[speed, 0.0, 0.0],
                 &mut motors,
                 0.5e-3,

@@ -6,8 +6,9 @@ use eel_vertebra::{Drive, Sample};
 use super::algebra::{Mat3, Vec3};
 use super::chain::Load;
 use super::config::{Config, Motor};
+use super::defect::Defects;
 use super::motor::{self, Bridge, Line, MotorState};
-use super::power::Power;
+use super::power::{Power, Supply};
 use super::random::Random;
 use super::transmission::{Link, Transmission};
 
@@ -28,6 +29,7 @@ pub struct Wrist {
     /// Encoder count at a motor angle of zero: where the counter stood at power-up.
     offsets: [i32; 3],
     random: Random,
+    defects: Defects,
     started: bool,
 }
 
@@ -50,6 +52,7 @@ impl Wrist {
             motors: std::array::from_fn(|_| MotorState::new(&config.motor)),
             offsets: std::array::from_fn(|_| random.within(1 << 20)),
             random,
+            defects: Defects::default(),
             started: false,
         }
     }
@@ -67,11 +70,18 @@ impl Wrist {
         self.follow(rotation, rate, step);
         let speeds = self.link.rates * rate;
         let (mut torques, mut shares) = ([0.0; 3], [0.0; 3]);
+        let (drives, damping) = (self.defects.driven(*drives), self.defects.damping());
+        let wrong_a = self.defects.current_error_a();
+        let supply = Supply {
+            volts: supply_v,
+            wrong_a,
+        };
         self.bridges = self
             .power
-            .act(motor, drives, supply_v, &speeds.0, &mut self.motors, step);
+            .act(motor, &drives, &supply, &speeds.0, &mut self.motors, step);
         for i in 0..3 {
-            let line = motor::line(motor, self.bridges[i], speeds.0[i]);
+            let mut line = motor::line(motor, self.bridges[i], speeds.0[i]);
+            line.slope += damping[i];
             self.lines[i] = line;
             torques[i] = line.torque - line.slope * speeds.0[i] - motor.inertia * self.turning.0[i];
             shares[i] = motor.inertia + step * line.slope;
@@ -113,6 +123,11 @@ impl Wrist {
         std::array::from_fn(|i| motor.constant * self.motors[i].current_a)
     }
 
+    /// Returns what is wrong with it.
+    pub fn defects_mut(&mut self) -> &mut Defects {
+        &mut self.defects
+    }
+
     /// Returns the motors.
     pub fn motors(&self) -> &[MotorState; 3] {
         &self.motors
@@ -143,7 +158,7 @@ impl Wrist {
             let milliamps = libm::round(self.motors[i].take_mean_current() * 1e3) as i32;
             Current::from_milliamps(milliamps + self.random.within(1))
         });
-        Sample {
+        self.defects.spoil(Sample {
             encoder_counts,
             absolute,
             current,
@@ -151,8 +166,9 @@ impl Wrist {
             board_temperature: decidegrees(self.board_c(&config.motor)),
             motor_temperature: std::array::from_fn(|i| decidegrees(self.motors[i].housing_c)),
             bridge_fault: [false; 3],
+            over_current: self.power.tripped(),
             emergency_stop: false,
-        }
+        })
     }
 
     /// Reads a crank's absolute encoder: 14 bits, wrong by up to one more step.

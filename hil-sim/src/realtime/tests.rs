@@ -187,7 +187,7 @@ fn an_unconfigured_vertebra_is_silent_until_it_is_given_an_id_which_it_keeps() {
     // The flash keeps the id over a loss of power, which the node does not see coming.
     let now = Instant::from_micros(nodes.counters().ticks * 1_000);
     let (_, node) = nodes.nodes.get_mut(1).unwrap();
-    node.reset(now);
+    node.reset(now, crate::robot::Reset::Power);
     let boot_up = Frame::standard(Cob::Heartbeat(3).id(), &[0]).unwrap();
     assert!(ticks(&mut nodes, &mut bus, 2).contains(&boot_up));
 

@@ -10,6 +10,7 @@ mod fault;
 mod link;
 mod node;
 mod qemu;
+mod supervisor;
 #[cfg(test)]
 mod tests;
 
@@ -27,10 +28,13 @@ use crate::plant::{Config as PlantConfig, Plant};
 pub use clock::{PLANT_STEP_NS, TICK_NS};
 pub use fault::{Fault, FaultKind};
 pub use link::{Link, SENDING};
-pub use node::{NativeNode, Node, Turn, prototype};
+pub use node::{NativeNode, Node, Reset, Turn, prototype};
 pub use qemu::QemuNode;
+pub use supervisor::{BROWN_OUT_V, STALL_NS, WATCHDOG_NS};
 
 use clock::{Happening, Schedule};
+use fault::Muffle;
+use supervisor::Supervisor;
 
 /// Vertebrae of the eel.
 pub const NODES: usize = VERTEBRAE as usize;
@@ -83,6 +87,7 @@ pub struct Robot {
     head: Head,
     head_link: Link,
     head_silent: bool,
+    muffle: Muffle,
     nodes: Vec<Seat>,
     faults: Vec<Fault>,
 }
@@ -93,6 +98,7 @@ struct Seat {
     node: Box<dyn Node>,
     link: Link,
     drives: [Drive; 3],
+    supervisor: Supervisor,
 }
 
 impl Robot {
@@ -124,6 +130,7 @@ impl Robot {
                 node: make(id)?,
                 link,
                 drives: [Drive::Off; 3],
+                supervisor: Supervisor::default(),
             });
         }
         let mut faults = config.faults.clone();
@@ -136,6 +143,7 @@ impl Robot {
             head: Head::new(config.head, Instant::ZERO),
             head_link,
             head_silent: false,
+            muffle: Muffle::default(),
             nodes,
             faults,
         })
@@ -255,7 +263,9 @@ impl Robot {
         }
         self.head.tick(now);
         while let Some(frame) = self.head.poll_transmit() {
-            self.head_link.send(&mut self.bus, self.now_ns, frame);
+            if let Some(frame) = self.muffle.pass(frame) {
+                self.head_link.send(&mut self.bus, self.now_ns, frame);
+            }
         }
         while let Some(event) = self.head.poll_event() {
             observer.head(now, event);
@@ -263,6 +273,9 @@ impl Robot {
     }
 
     fn tick_node(&mut self, index: usize, observer: &mut impl Observer) {
+        if !self.may_turn(index) {
+            return;
+        }
         let now = instant(self.now_ns);
         let sample: Sample = self.plant.sample(index);
         let seat = &mut self.nodes[index];
@@ -282,30 +295,6 @@ impl Robot {
             drives: seat.drives,
         };
         observer.turn(seat.id, seat.node.as_ref(), &turn, &self.plant);
-    }
-
-    /// Lets happen what is due to go wrong.
-    fn apply_faults(&mut self) {
-        while self
-            .faults
-            .first()
-            .is_some_and(|fault| fault.at_ns <= self.now_ns)
-        {
-            let fault = self.faults.remove(0);
-            match fault.kind {
-                FaultKind::HeadSilent => {
-                    self.head_silent = true;
-                    self.head_link.power(&mut self.bus, self.now_ns, false);
-                }
-                FaultKind::NodeReset(id) => {
-                    let seat = &mut self.nodes[id.index()];
-                    seat.link.power(&mut self.bus, self.now_ns, false);
-                    seat.link.power(&mut self.bus, self.now_ns, true);
-                    seat.node.reset(instant(self.now_ns));
-                    seat.drives = [Drive::Off; 3];
-                }
-            }
-        }
     }
 }
 

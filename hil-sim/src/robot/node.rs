@@ -3,7 +3,7 @@
 use eel_protocol::{Frame, NodeId, State};
 use eel_units::Instant;
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Drive, Event, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Drive, Event, Keepsake, Sample, Settings, Vertebra, turn};
 
 /// Everything that went into a turn and came out of it.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +22,15 @@ pub struct Turn<'a> {
     pub drives: [Drive; 3],
 }
 
+/// Why a microcontroller starts anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reset {
+    /// Its power or the reset pin: nothing but the flash is remembered.
+    Power,
+    /// A watchdog, a panic or a fault of the CPU: its memory is what it was.
+    Failure,
+}
+
 /// Something that is a vertebra: natively, in an emulator, or on a board.
 pub trait Node {
     /// Takes one turn of the control tick and appends what is to be sent, at most `room` frames.
@@ -34,8 +43,8 @@ pub trait Node {
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3];
 
-    /// Starts anew, as after a power cycle of the microcontroller.
-    fn reset(&mut self, now: Instant);
+    /// Starts anew.
+    fn reset(&mut self, now: Instant, cause: Reset);
 
     /// Returns the vertebra itself where it lives in this process.
     fn vertebra(&self) -> Option<&Vertebra>;
@@ -59,6 +68,7 @@ pub trait Node {
 pub struct NativeNode {
     settings: Settings,
     store: Store<RamFlash>,
+    kept: Keepsake,
     vertebra: Vertebra,
 }
 
@@ -81,6 +91,7 @@ impl NativeNode {
         Self {
             settings,
             store: Store::new(RamFlash::new()),
+            kept: Keepsake::EMPTY,
             vertebra: Vertebra::new(settings, Instant::ZERO),
         }
     }
@@ -105,11 +116,16 @@ impl Node for NativeNode {
             sent.push(frame);
         });
         store::serve(&mut self.vertebra, &mut self.store, now);
+        self.kept = self.vertebra.poll_keepsake().unwrap_or(self.kept);
         drives
     }
 
-    fn reset(&mut self, now: Instant) {
-        self.vertebra = Vertebra::with_stored(self.settings, &self.store.load(), now);
+    fn reset(&mut self, now: Instant, cause: Reset) {
+        let stored = self.store.load();
+        self.vertebra = match cause {
+            Reset::Power => Vertebra::with_stored(self.settings, &stored, now),
+            Reset::Failure => Vertebra::after_failure(self.settings, &stored, &self.kept, now),
+        };
     }
 
     fn vertebra(&self) -> Option<&Vertebra> {

@@ -17,7 +17,7 @@ use eel_vertebra::lockstep::{HEADER, Header, Input, Kind, MAX_FRAMES, Output, St
 use eel_vertebra::{Drive, Event, Sample, Vertebra};
 use tempfile::TempDir;
 
-use super::node::{Node, prototype};
+use super::node::{Node, Reset, prototype};
 
 /// The emulator of Arm's processors.
 const EMULATOR: &str = "qemu-system-arm";
@@ -87,6 +87,7 @@ impl QemuNode {
                 node: id,
                 serial: prototype(id).serial,
                 now: Instant::ZERO,
+                failed: false,
             },
             emulator,
             to_image,
@@ -95,12 +96,13 @@ impl QemuNode {
             failure: None,
             _folder: folder,
         };
-        node.power_up(Instant::ZERO)?;
+        node.power_up(Instant::ZERO, Reset::Power)?;
         Ok(node)
     }
 
-    fn power_up(&mut self, now: Instant) -> anyhow::Result<()> {
+    fn power_up(&mut self, now: Instant, cause: Reset) -> anyhow::Result<()> {
         self.start.now = now;
+        self.start.failed = cause == Reset::Failure;
         self.state = State::NotReady;
         let packet = self.start.encode();
         self.to_image.write_all(packet.as_bytes())?;
@@ -179,8 +181,8 @@ impl Node for QemuNode {
         }
     }
 
-    fn reset(&mut self, now: Instant) {
-        if let Err(error) = self.power_up(now) {
+    fn reset(&mut self, now: Instant, cause: Reset) {
+        if let Err(error) = self.power_up(now, cause) {
             self.fail(error);
         }
     }

@@ -54,8 +54,8 @@ impl Node for Deaf {
         self.node.turn(now, &heard, sample, room, sent)
     }
 
-    fn reset(&mut self, now: Instant) {
-        self.node.reset(now);
+    fn reset(&mut self, now: Instant, cause: Reset) {
+        self.node.reset(now, cause);
     }
 
     fn vertebra(&self) -> Option<&Vertebra> {

@@ -34,7 +34,7 @@ impl Board {
     const fn ceiling(self) -> Size {
         match self {
             Self::Stm32g474 => Size {
-                flash: 112 * 1024,
+                flash: 128 * 1024,
                 ram: 32 * 1024,
             },
             Self::Qemu => Size {

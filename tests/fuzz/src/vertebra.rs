@@ -50,6 +50,7 @@ impl Bench {
                 board_temperature: Temperature::from_decidegrees(250),
                 motor_temperature: [Temperature::from_decidegrees(250); 3],
                 bridge_fault: [false; 3],
+                over_current: [false; 3],
                 emergency_stop: false,
             },
             now,
@@ -135,7 +136,7 @@ impl Bench {
     fn measure(&mut self, input: &mut Input<'_>) {
         let motor = input.below(3);
         let sample = &mut self.sample;
-        match input.below(9) {
+        match input.below(10) {
             0 => sample.encoder_counts[motor] = input.long().cast_signed(),
             1 => {
                 let step = i32::from(input.byte().cast_signed());
@@ -156,6 +157,7 @@ impl Bench {
                     Temperature::from_decidegrees(input.long().cast_signed());
             }
             7 => sample.bridge_fault[motor] ^= true,
+            8 => sample.over_current[motor] ^= true,
             _ => sample.emergency_stop ^= true,
         }
     }

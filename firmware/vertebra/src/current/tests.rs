@@ -225,6 +225,32 @@ fn a_setpoint_is_the_current_of_the_torque_within_the_limit() {
     assert_eq!(most.current, Motor::PROTOTYPE.current_limit);
 }
 
+#[test]
+fn a_bridge_whose_current_is_out_of_hand_stays_off_until_it_is_told_to_be() {
+    let mut current_loop = CurrentLoop::new(&Motor::PROTOTYPE);
+    let driven = [Drive::Current(Setpoint::default()); 3];
+    let at = |amps: i32| [0, amps, 0].map(Current::from_milliamps);
+    current_loop.set(&driven, SUPPLY);
+    current_loop.update(at(3_750));
+    assert_eq!(
+        current_loop.tripped(),
+        [false; 3],
+        "at the limit, not beyond it"
+    );
+    let [_, switching, _] = current_loop.update(at(-3_751));
+    assert_eq!(switching, Switching::Off, "in the same period");
+    current_loop.set(&driven, SUPPLY);
+    let [other, switching, _] = current_loop.update(at(0));
+    assert_eq!(switching, Switching::Off);
+    assert!(matches!(other, Switching::Duty(_)), "the others go on");
+    assert_eq!(current_loop.tripped(), [false, true, false]);
+    current_loop.set(&[Drive::Brake; 3], SUPPLY);
+    current_loop.set(&driven, SUPPLY);
+    assert_eq!(current_loop.tripped(), [false; 3]);
+    let all = current_loop.update(at(0));
+    assert!(all.iter().all(|it| matches!(it, Switching::Duty(_))));
+}
+
 proptest! {
     #[test]
     fn any_motor_setpoint_current_and_supply_has_a_duty(
@@ -239,13 +265,17 @@ proptest! {
             emf: Voltage::from_millivolts(emf),
         };
         current_loop.set(&[Drive::Current(setpoint); 3], Voltage::from_millivolts(supply));
+        let hard = i64::from(Motor::PROTOTYPE.current_limit.to_microamps()) * 3 / 2;
+        let mut tripped = false;
         for raw in measured {
+            tripped |= i64::from(raw).abs() > hard;
             for switching in current_loop.update([Current::from_microamps(raw); 3]) {
-                let Switching::Duty(duty) = switching else {
-                    panic!("{switching:?}");
-                };
-                prop_assert!(duty.abs() <= Duty::FULL);
+                match switching {
+                    Switching::Duty(duty) => prop_assert!(!tripped && duty.abs() <= Duty::FULL),
+                    other => prop_assert!(tripped && other == Switching::Off),
+                }
             }
+            prop_assert_eq!(current_loop.tripped(), [tripped; 3]);
         }
     }
 }

@@ -29,10 +29,14 @@ fn frames() -> impl Strategy<Value = Frames> {
 fn input() -> impl Strategy<Value = Input> {
     type Three = [i32; 3];
     let numbers = any::<(Three, [Option<i32>; 3], Three, i32, i32, Three)>();
-    let others = (any::<([bool; 3], bool)>(), frames(), 0..=MAX_FRAMES as u8);
+    let others = (
+        any::<([bool; 3], [bool; 3], bool)>(),
+        frames(),
+        0..=MAX_FRAMES as u8,
+    );
     (any::<u64>(), numbers, others).prop_map(
         |(now, (counts, angles, currents, supply, board, motors), others)| {
-            let ((faults, stop), frames, room) = others;
+            let ((faults, tripped, stop), frames, room) = others;
             let sample = Sample {
                 encoder_counts: counts,
                 absolute: angles.map(|angle| angle.map(Angle::from_q29)),
@@ -41,6 +45,7 @@ fn input() -> impl Strategy<Value = Input> {
                 board_temperature: Temperature::from_decidegrees(board),
                 motor_temperature: motors.map(Temperature::from_decidegrees),
                 bridge_fault: faults,
+                over_current: tripped,
                 emergency_stop: stop,
             };
             Input {
@@ -122,14 +127,15 @@ fn a_start_has_these_bytes() {
         node: NodeId::new(7).unwrap(),
         serial: 0x1234_5678,
         now: Instant::from_micros(1_000),
+        failed: true,
     };
     let bytes = [
-        b'S', 3, 13, 0, 7, 0x78, 0x56, 0x34, 0x12, 0xE8, 0x03, 0, 0, 0, 0, 0, 0,
+        b'S', 4, 14, 0, 7, 0x78, 0x56, 0x34, 0x12, 0xE8, 0x03, 0, 0, 0, 0, 0, 0, 1,
     ];
     assert_eq!(start.encode().as_bytes(), bytes);
     assert_eq!(Start::decode(&bytes[HEADER..]), Ok(start));
     assert_eq!(
-        Start::decode(&[11, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+        Start::decode(&[11, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
         Err(PacketError::Value)
     );
 }

@@ -334,6 +334,23 @@ impl Bench {
         assert_eq!(self.state(), State::Run, "{:?}", self.vertebra.status());
     }
 
+    /// Somebody moves the wrist to a pose in so many milliseconds: what jumps there is no motor.
+    pub fn move_to(&mut self, at: Pose, millis: u32) {
+        let from = self.pose;
+        for step in 1..=millis {
+            let between = |from: Angle, to: Angle| {
+                let (from, to) = (i64::from(from.to_q29()), i64::from(to.to_q29()));
+                Angle::from_q29((from + (to - from) * i64::from(step) / i64::from(millis)) as i32)
+            };
+            self.pose = Pose {
+                yaw: between(from.yaw, at.yaw),
+                pitch: between(from.pitch, at.pitch),
+                roll: between(from.roll, at.roll),
+            };
+            self.tick();
+        }
+    }
+
     /// Lets the encoders tell where the wrist is.
     fn measure(&mut self) {
         if self.measures {
@@ -401,6 +418,7 @@ pub fn healthy() -> Sample {
         board_temperature: Temperature::from_decidegrees(300),
         motor_temperature: [Temperature::from_decidegrees(250); 3],
         bridge_fault: [false; 3],
+        over_current: [false; 3],
         emergency_stop: false,
     }
 }
