@@ -19,6 +19,8 @@ pub struct Live<'a> {
     pub nodes: &'a [NodeId],
     /// Which have none, until LSS gives them one.
     pub unconfigured: &'a [NodeId],
+    /// Which were never calibrated.
+    pub uncalibrated: &'a [NodeId],
     /// Time until the end, s; until Ctrl-C without one.
     pub seconds: Option<f64>,
     /// Where encoders start, noise of the sensors.
@@ -51,6 +53,9 @@ pub fn run(live: &Live<'_>) -> anyhow::Result<bool> {
     let plant = Config::default();
     let (nodes, unconfigured) = (live.nodes, live.unconfigured);
     let mut vertebrae = Realtime::with_unconfigured(bus, &plant, live.seed, nodes, unconfigured);
+    for id in live.uncalibrated {
+        vertebrae.uncalibrate(*id, live.seed);
+    }
     let mut display = Display::new();
     let limit = live.seconds.map(Duration::from_secs_f64);
     let start = Instant::now();

@@ -44,6 +44,10 @@ struct LiveArgs {
     /// an LSS master gives them one
     #[arg(long, value_name = "PLACES", value_parser = node_ids)]
     unconfigured: Option<NodeList>,
+    /// With --can: these vertebrae are built in at random, by the seed, and were never calibrated: each
+    /// refuses to be enabled until `eel calibrate` has been at it. Hands turn its wrist when it asks for it
+    #[arg(long, value_name = "IDS", value_parser = node_ids)]
+    uncalibrated: Option<NodeList>,
     /// With --can: time until the end, s [0.1 to 1e6]
     #[arg(long, value_parser = between(0.1, 1e6))]
     seconds: Option<f64>,
@@ -56,6 +60,7 @@ impl LiveArgs {
     /// Tells whether an option was given that means nothing without an interface.
     fn is_used(&self) -> bool {
         self.nodes.is_some()
+            || self.uncalibrated.is_some()
             || self.unconfigured.is_some()
             || self.seconds.is_some()
             || self.seed.is_some()
@@ -172,7 +177,7 @@ fn main() -> ExitCode {
         (Some(Command::Check(args)), _) => run_checks(args),
         (None, Some(interface)) => run_live(interface, &cli.live),
         (None, None) if cli.live.is_used() => Err(anyhow::anyhow!(
-            "--nodes, --unconfigured, --seconds and --seed go with --can IFACE; to swim in simulated \
+            "--nodes, --unconfigured, --uncalibrated, --seconds and --seed go with --can IFACE; to swim in simulated \
              time, put `swim` before the options: hil-sim swim --seconds 5"
         )),
         (None, None) => run_swim(&SwimArgs::defaults()),
@@ -246,12 +251,14 @@ fn run_live(interface: &str, args: &LiveArgs) -> anyhow::Result<bool> {
         .clone()
         .unwrap_or_else(|| NodeList(NodeId::all().collect()));
     let unconfigured = args.unconfigured.as_ref().map_or(&[][..], |list| &list.0);
+    let uncalibrated = args.uncalibrated.as_ref().map_or(&[][..], |list| &list.0);
     let (seconds, seed) = (args.seconds, args.seed.unwrap_or(1));
     interrupt::listen()?;
     live::run(&live::Live {
         interface,
         nodes: &nodes.0,
         unconfigured,
+        uncalibrated,
         seconds,
         seed,
     })

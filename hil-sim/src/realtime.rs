@@ -18,9 +18,10 @@ use std::time::{Duration, Instant as HostInstant, SystemTime, UNIX_EPOCH};
 use eel_protocol::{Frame, NodeId};
 use eel_transport::{Bus, BusError, Received};
 use eel_units::Instant;
-use eel_vertebra::Drive;
+use eel_vertebra::{Drive, Hands, Vertebra};
 
-use crate::plant::{Config as PlantConfig, Plant};
+use crate::plant::joint::Target;
+use crate::plant::{Config as PlantConfig, Mounting, Plant};
 use crate::robot::{NODES, NativeNode, Node, PLANT_STEP_NS, SENDING, TICK_NS};
 
 pub use pace::{CATCH_UP_TICKS, Pace};
@@ -30,6 +31,8 @@ const RECEIVED_PER_TICK: usize = 256;
 /// A frame that seems to come from farther ahead than this was there when the host's clock was set
 /// back: 1 s.
 const CLOCK_SET_NS: u64 = 1_000_000_000;
+/// How far hands turn a wrist in a tick, rad: half a radian a second.
+const HAND_STEP: f64 = 0.5e-3;
 /// Frames that wait for the bus at which the nodes send no more.
 const BEHIND: usize = 64;
 
@@ -56,6 +59,8 @@ pub struct Realtime<B> {
     drives: [[Drive; 3]; NODES],
     /// What the nodes sent in their last tick, and which of them.
     local: Vec<(usize, Frame)>,
+    /// Those that were never calibrated, and where hands hold each: yaw, pitch, roll, rad.
+    handled: Vec<(NodeId, [f64; 3])>,
     incoming: Vec<Frame>,
     /// What came after the millisecond that the last tick stood for.
     held: Option<Received>,
@@ -96,10 +101,50 @@ impl<B: Bus> Realtime<B> {
             nodes: NodeId::all().filter_map(power).collect(),
             drives: [[Drive::Off; 3]; NODES],
             local: Vec::new(),
+            handled: Vec::new(),
             incoming: Vec::new(),
             held: None,
             outgoing: VecDeque::new(),
             counters: Counters::default(),
+        }
+    }
+
+    /// Builds a vertebra's motors and sensors in at random, by the seed of the sensors, and lets it know
+    /// nothing of that: it has to be calibrated. Hands turn its wrist when a procedure asks for it.
+    pub fn uncalibrate(&mut self, id: NodeId, seed: u64) {
+        let Some((_, node)) = self.nodes.iter_mut().find(|(other, _)| *other == id) else {
+            return;
+        };
+        *node = node.uncalibrated();
+        self.plant
+            .set_mounting(id.index(), Mounting::random(seed, id.index()));
+        self.handled.push((id, [0.0; 3]));
+    }
+
+    /// Lets hands turn the wrists that wait for it.
+    fn handle(&mut self) {
+        for (id, hold) in &mut self.handled {
+            let mut nodes = self.nodes.iter().filter(|(other, _)| other == id);
+            let waits_for = nodes
+                .find_map(|(_, node)| node.vertebra())
+                .and_then(Vertebra::waits_for);
+            let wanted = match waits_for {
+                Some(Hands::Yaw) => [0.42, 0.0, 0.0],
+                Some(Hands::Roll) => [0.0, 0.0, 0.06],
+                None => {
+                    *hold = [0.0; 3];
+                    self.plant.set_hands(id.index(), None);
+                    continue;
+                }
+            };
+            for (now, wanted) in hold.iter_mut().zip(wanted) {
+                *now += f64::clamp(wanted - *now, -HAND_STEP, HAND_STEP);
+            }
+            let target = Target {
+                pose: *hold,
+                rates: [0.0; 3],
+            };
+            self.plant.set_hands(id.index(), Some(target));
         }
     }
 
@@ -158,6 +203,7 @@ impl<B: Bus> Realtime<B> {
             self.local
                 .extend(sent.drain(..).map(|frame| (index, frame)));
         }
+        self.handle();
         for _ in 0..TICK_NS / PLANT_STEP_NS {
             self.plant.step(&self.drives);
         }

@@ -7,6 +7,9 @@
 #[path = "socketcan/bring_up.rs"]
 mod bring_up;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/calibrating.rs"]
+mod calibrating;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/can_utils.rs"]
 mod can_utils;
 #[cfg(target_os = "linux")]

@@ -187,6 +187,7 @@ fn codes_are_these_numbers() {
         (10, "fault"),
         (12, "moment"),
         (13, "motor"),
+        (14, "test"),
     ];
     assert_eq!(states, pinned);
     let limits: Vec<_> = LimitCode::ALL

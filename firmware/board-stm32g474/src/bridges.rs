@@ -3,7 +3,7 @@
 //! What has forced the PWM low, be it the line or [`force_off`], stays until the vertebra has been told
 //! and has kept the bridges from driving for two ticks: by then no old duty is left in the timer.
 
-use eel_drivers::{Bridge, BridgeError, Orientation};
+use eel_drivers::{Bridge, BridgeError};
 use eel_units::Voltage;
 use eel_vertebra::{CurrentLoop, Drive, Motor};
 use embassy_stm32::Peri;
@@ -47,15 +47,11 @@ pub struct Bridges {
 }
 
 impl Bridges {
-    /// Takes the connections of motors that are built in like this; the bridges are off.
+    /// Takes the connections; the bridges are off.
     ///
     /// # Errors
     /// None that these connections can have.
-    pub fn new(
-        connections: Connections,
-        orientations: [Orientation; 3],
-        motor: &Motor,
-    ) -> Result<Self, BridgeError> {
+    pub fn new(connections: Connections, motor: &Motor) -> Result<Self, BridgeError> {
         let Connections {
             timer,
             pwm,
@@ -85,7 +81,7 @@ impl Bridges {
             Bridge::new(two, low(direction.1), low(wake.1))?,
             Bridge::new(three, low(direction.2), low(wake.2))?,
         ];
-        power::start(motors, orientations, CurrentLoop::new(motor));
+        power::start(motors, CurrentLoop::new(motor));
         Ok(Self {
             faults: [
                 Input::new(fault.0, Pull::Up),

@@ -2,7 +2,6 @@
 
 use core::array::from_fn;
 
-use eel_drivers::Orientation;
 use eel_protocol::NodeId;
 use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::store::{StoreError, Stored};
@@ -15,10 +14,6 @@ use crate::currents::{self, Currents};
 use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
 use crate::{bus, failure, liveness, power, storage};
-
-/// How the motors and their encoders are built in. The one table of signs: [`measure`] turns what
-/// comes from the sensors by it, the current loop in `power.rs` what goes to the bridges.
-const ORIENTATIONS: [Orientation; 3] = [Orientation::DIRECT; 3];
 
 /// Everything that the tick measures with and acts on.
 pub struct Hardware {
@@ -51,7 +46,7 @@ pub struct Birth {
 pub async fn run(hardware: Hardware, birth: Birth) {
     let (crank_bus, select) = hardware.cranks.start();
     let cranks = Cranks::new(&crank_bus, select);
-    let bridges = Bridges::new(hardware.bridges, ORIENTATIONS, &birth.settings.motor);
+    let bridges = Bridges::new(hardware.bridges, &birth.settings.motor);
     let (Some(mut cranks), Ok(mut bridges)) = (cranks, bridges) else {
         // Can't happen with these pins; the watchdog starts anew.
         bridges::force_off();
@@ -127,11 +122,10 @@ fn measure(
     let measured = currents.take();
     let (board_temperature, motor_temperature) = temperatures();
     let faults = bridges.faults();
-    let (counts, angles) = (counters.read(), cranks.read());
     Sample {
-        encoder_counts: from_fn(|motor| ORIENTATIONS[motor].count(counts[motor])),
-        absolute: from_fn(|motor| angles[motor].map(|angle| ORIENTATIONS[motor].angle(angle))),
-        current: from_fn(|motor| ORIENTATIONS[motor].current(measured.currents[motor])),
+        encoder_counts: counters.read(),
+        absolute: cranks.read(),
+        current: measured.currents,
         supply: measured.supply,
         board_temperature,
         motor_temperature,

@@ -2,7 +2,7 @@
 
 use defmt_rtt as _;
 use eel_protocol::NodeId;
-use eel_vertebra::Settings;
+use eel_vertebra::{Calibration, Settings};
 use embassy_executor::{InterruptExecutor, SendSpawner, SpawnError, SpawnToken};
 use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
@@ -63,6 +63,8 @@ fn start(p: Peripherals, cause: failure::Start) -> Storage {
     let stored = storage.load();
     let settings = Settings {
         node: read_node(p.PA2, p.PA3, p.PB9, p.PB11),
+        // Nothing is known of this unit before it is calibrated.
+        calibration: Calibration::NONE,
         ..Settings::unconfigured(serial())
     };
     // What LSS has stored outranks the switches.

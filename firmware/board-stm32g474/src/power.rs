@@ -3,7 +3,7 @@
 use core::cell::RefCell;
 
 use critical_section::Mutex;
-use eel_drivers::{Bridge, Orientation, Output};
+use eel_drivers::{Bridge, Output};
 use eel_units::{Current, Voltage, multiply_high};
 use eel_vertebra::{CurrentLoop, Drive, Switching};
 use embassy_stm32::gpio::Output as Pin;
@@ -24,7 +24,6 @@ pub const FRACTIONS: u32 = 16;
 /// What the interrupt drives.
 struct Power {
     motors: [Motor; 3],
-    orientations: [Orientation; 3],
     current_loop: CurrentLoop,
     /// Conversions at no current, in sixteenths of a step.
     offsets: [i32; 3],
@@ -33,12 +32,11 @@ struct Power {
 static POWER: Mutex<RefCell<Option<Power>>> = Mutex::new(RefCell::new(None));
 
 /// Hands bridges that are off over to the interrupt.
-pub fn start(motors: [Motor; 3], orientations: [Orientation; 3], current_loop: CurrentLoop) {
+pub fn start(motors: [Motor; 3], current_loop: CurrentLoop) {
     critical_section::with(|section| {
         if let Ok(mut power) = POWER.borrow(section).try_borrow_mut() {
             *power = Some(Power {
                 motors,
-                orientations,
                 current_loop,
                 offsets: [0; 3],
             });
@@ -103,18 +101,13 @@ impl Power {
     fn convert(&mut self, readings: [u16; 3]) {
         let [a, b, c] = readings;
         let [x, y, z] = self.offsets;
-        let [one, two, three] = self.orientations;
-        let measured = [
-            one.current(current(a, x)),
-            two.current(current(b, y)),
-            three.current(current(c, z)),
-        ];
+        let measured = [current(a, x), current(b, y), current(c, z)];
         let decided = self.current_loop.update(measured);
-        let built = self.motors.iter_mut().zip(self.orientations);
+        let motors = self.motors.iter_mut().zip(decided);
         let tripped = self.current_loop.tripped();
-        for (((motor, orientation), switching), tripped) in built.zip(decided).zip(tripped) {
+        for ((motor, switching), tripped) in motors.zip(tripped) {
             let output = match switching {
-                Switching::Duty(duty) => orientation.output(Output::Duty(duty)),
+                Switching::Duty(duty) => Output::Duty(duty),
                 Switching::Off if tripped => Output::Off,
                 // The others are as the control tick left them.
                 Switching::Off | Switching::Brake => continue,

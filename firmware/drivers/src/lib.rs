@@ -12,12 +12,10 @@ mod backoff;
 mod bridge;
 mod counter;
 mod encoder;
-mod orientation;
 mod thermistor;
 
 pub use backoff::Backoff;
 pub use bridge::{Bridge, BridgeError, Output};
 pub use counter::WideCounter;
 pub use encoder::{AbsoluteEncoder, EncoderError};
-pub use orientation::{Mounting, Orientation};
 pub use thermistor::thermistor;

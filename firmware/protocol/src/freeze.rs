@@ -26,7 +26,7 @@ pub struct TimeOfDay {
 /// On the wire, little-endian: version u8, state u8, motor u8, limit u8, code u16, detail u16, time u64,
 /// count u32, flags u16 (bit 0: TIME is known, 1: there is a reference), days u16, ms u32; pose,
 /// reference, angles, speeds, currents, each three i32; torques three i16, limit codes u16 (four bits
-/// each), supply i32, temperatures four i16, status word u16, 0 u16, the four counters u32.
+/// each), supply i32, temperatures four i16, status word u32, the four counters u32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreezeFrame {
     /// State just before.
@@ -134,7 +134,6 @@ impl FreezeFrame {
             out.put(temperature.to_le_bytes());
         }
         out.put(self.status.to_bits().to_le_bytes());
-        out.put([0; 2]);
         for counter in self.counters {
             out.put(counter.to_le_bytes());
         }
@@ -182,8 +181,7 @@ impl FreezeFrame {
         let supply = i32::from_le_bytes(from.take()?);
         let (board, one) = (from.take_i16()?, from.take_i16()?);
         let temperatures = [board, one, from.take_i16()?, from.take_i16()?];
-        let status = Status::from_bits(from.take_u16()?);
-        from.take_u16()?;
+        let status = Status::from_bits(from.take_u32()?);
         let (bad, lost) = (from.take_u32()?, from.take_u32()?);
         let counters = [bad, lost, from.take_u32()?, from.take_u32()?];
         Some(Self {
@@ -326,7 +324,7 @@ mod tests {
             FreezeFrame::from_bytes(&bytes[..127]),
             Err(FreezeError::Length)
         );
-        bytes[1] = 14;
+        bytes[1] = 11;
         assert_eq!(FreezeFrame::from_bytes(&bytes), Err(FreezeError::Value));
         bytes[0] = 2;
         assert_eq!(FreezeFrame::from_bytes(&bytes), Err(FreezeError::Version));

@@ -21,6 +21,7 @@ pub mod identity;
 mod ids;
 pub mod messages;
 pub mod pdo;
+pub mod procedure;
 pub mod scope;
 mod states;
 mod status;

@@ -83,6 +83,8 @@ nibble! {
         Moment = 12 "moment",
         /// Producing a torque of each motor, for commissioning.
         Motor = 13 "motor",
+        /// A procedure of object 0x2060 tries single motors.
+        Test = 14 "test",
     }
 }
 
@@ -114,6 +116,7 @@ impl State {
                 | Self::Brake
                 | Self::StopDamped
                 | Self::StopBrake
+                | Self::Test
         )
     }
 

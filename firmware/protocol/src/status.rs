@@ -36,11 +36,15 @@ pub enum Condition {
     CommandLate = 14,
     /// The pose is far from the target.
     FollowingError = 15,
+    /// Refuses enabling: the calibration is not this unit's.
+    Calibration = 16,
+    /// Refuses enabling: a current sensor reads a current while the bridges are off.
+    CurrentOffset = 17,
 }
 
 impl Condition {
     /// Every condition, from bit 0.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 18] = [
         Self::Settings,
         Self::Encoders,
         Self::Pose,
@@ -57,16 +61,21 @@ impl Condition {
         Self::MomentLimited,
         Self::CommandLate,
         Self::FollowingError,
+        Self::Calibration,
+        Self::CurrentOffset,
     ];
 
-    /// Returns the number of its bit, 0–15.
+    /// Returns the number of its bit, 0–17.
     pub const fn bit(self) -> u8 {
         self as u8
     }
 
     /// Tells whether the vertebra refuses to be enabled while it holds.
     pub const fn refuses(self) -> bool {
-        self.bit() <= Self::HeadLost.bit()
+        !matches!(
+            self,
+            Self::TargetLimited | Self::MomentLimited | Self::CommandLate | Self::FollowingError
+        )
     }
 
     /// Returns the name that tools print.
@@ -88,6 +97,8 @@ impl Condition {
             Self::MomentLimited => "moment-limited",
             Self::CommandLate => "command-late",
             Self::FollowingError => "following-error",
+            Self::Calibration => "calibration",
+            Self::CurrentOffset => "current-offset",
         }
     }
 
@@ -110,25 +121,33 @@ impl Condition {
             Self::MomentLimited => "Part of the moment could not be produced.",
             Self::CommandLate => "Targets are late; the wrist is slowing down.",
             Self::FollowingError => "The pose is far from the target.",
+            Self::Calibration => "The calibration is not this unit's: `eel calibrate`.",
+            Self::CurrentOffset => "A current sensor reads a current while the bridges are off.",
         }
     }
 }
 
+/// The bits that refuse nothing.
+const WARNINGS: u32 = 1 << Condition::TargetLimited.bit()
+    | 1 << Condition::MomentLimited.bit()
+    | 1 << Condition::CommandLate.bit()
+    | 1 << Condition::FollowingError.bit();
+
 /// The status word: a set of conditions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Status(u16);
+pub struct Status(u32);
 
 impl Status {
     /// No condition holds.
     pub const NONE: Self = Self(0);
 
     /// Reads the word; every pattern is a status.
-    pub const fn from_bits(bits: u16) -> Self {
+    pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
 
     /// Returns the word.
-    pub const fn to_bits(self) -> u16 {
+    pub const fn to_bits(self) -> u32 {
         self.0
     }
 
@@ -151,7 +170,7 @@ impl Status {
     /// Returns the part that refuses enabling.
     #[must_use]
     pub const fn refusals(self) -> Self {
-        Self(self.0 & ((1 << (Condition::HeadLost.bit() + 1)) - 1))
+        Self(self.0 & !WARNINGS)
     }
 
     /// Tells whether no condition holds.

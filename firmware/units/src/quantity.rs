@@ -140,6 +140,12 @@ impl Angle {
     pub const fn from_milliradians(raw: i32) -> Self {
         Self(saturate(((raw as i64) << 29) / 1_000))
     }
+
+    /// Makes an angle from microradians, rounded to nearest; saturates beyond ±4 rad.
+    pub const fn from_microradians(raw: i32) -> Self {
+        let half = if raw < 0 { -500_000 } else { 500_000 };
+        Self(saturate((((raw as i64) << 29) + half) / 1_000_000))
+    }
 }
 
 impl AngularVelocity {

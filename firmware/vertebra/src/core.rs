@@ -19,6 +19,7 @@ use crate::limits::{MotorBounds, Situation, Standing, bounds};
 use crate::machine::Machine;
 use crate::objects::{Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
+use crate::procedure::Procedure;
 use crate::settings::Settings;
 use crate::spare::Spare;
 use crate::spline::{Reference, Spline};
@@ -94,6 +95,10 @@ pub(crate) struct Core {
     pub raised: bool,
     /// The time of day, once TIME came; outlives a reset of the node.
     pub clock: Option<Clock>,
+    /// The step of a calibration, or the self test.
+    pub procedure: Procedure,
+    /// What each current sensor reads while the bridges are off, low-passed, in 1/64 µA.
+    pub idle: [i64; 3],
     /// Whether settings were stored and are lost, so that these are not the ones meant.
     pub settings_lost: bool,
 }
@@ -153,6 +158,8 @@ impl Core {
             freeze: None,
             raised: false,
             clock: None,
+            procedure: Procedure::default(),
+            idle: [0; 3],
             settings_lost: false,
             settings,
         }
@@ -170,9 +177,10 @@ impl Core {
         self.friction = Compensation::new(&self.settings.motor.friction);
     }
 
-    /// Does one control tick.
-    pub fn tick(&mut self, now: Instant, sample: &Sample) -> [Drive; 3] {
+    /// Does one control tick, with what the sensors read and the bridges are told in their own senses.
+    pub fn tick(&mut self, now: Instant, raw: &Sample) -> [Drive; 3] {
         self.now = now;
+        let sample = &self.settings.calibration.apply(*raw);
         self.sample = Some(*sample);
         let motors = self.thermal.iter_mut().zip(sample.current);
         for ((thermal, current), is_open) in motors.zip(self.is_open) {
@@ -192,7 +200,13 @@ impl Core {
         self.machine
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
-        let drives = self.drive(motion.as_ref(), sample);
+        let drives = match self.proceed(raw) {
+            Some(drives) => drives,
+            None => {
+                let drives = self.drive(motion.as_ref(), sample);
+                self.settings.calibration.drives(drives)
+            }
+        };
         self.is_open = drives.map(|drive| drive == Drive::Off);
         self.forget_warnings();
         self.report();
@@ -203,6 +217,10 @@ impl Core {
 
     /// Turns readings into angles, speeds and the pose, and returns what the wrist does.
     fn estimate(&mut self, sample: &Sample) -> Option<Motion> {
+        if self.is_being_calibrated() {
+            // What counts and angles mean is not known.
+            self.encoders = [Encoder::new(&self.settings.motor); 3];
+        }
         let readings = sample.encoder_counts.into_iter().zip(sample.absolute);
         for (motor, (encoder, (count, absolute))) in
             self.encoders.iter_mut().zip(readings).enumerate()
@@ -315,7 +333,7 @@ impl Core {
             State::StopDamped => Some(self.stop_cap()),
             State::Brake | State::StopBrake => return [Drive::Brake; 3],
             State::Fault => return self.fault_drives(),
-            State::NotReady | State::SwitchedOff | State::Ready | State::StopOff => {
+            State::NotReady | State::SwitchedOff | State::Ready | State::StopOff | State::Test => {
                 return [Drive::Off; 3];
             }
         };

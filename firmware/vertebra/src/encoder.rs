@@ -91,6 +91,12 @@ impl Encoder {
         }
     }
 
+    /// Returns the angle of so many counts.
+    pub const fn angle_of(motor: &Motor, counts: i32) -> Angle {
+        let turned = (counts as i64).wrapping_mul(Self::new(motor).scale) >> 16;
+        Angle::from_q29(saturate(turned))
+    }
+
     /// Takes the readings of one tick.
     ///
     /// # Errors

@@ -2,7 +2,8 @@
 
 use eel_units::{Angle, Current, Temperature, Voltage};
 
-/// Everything measured for one control tick; motors in the order 1, 2, 3.
+/// Everything measured for one control tick; motors in the order 1, 2, 3. A platform gives what the
+/// sensors read, in their own senses; the vertebra's calibration makes it what is said here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sample {
     /// Quadrature counts of each motor since power-up, positive with the motor's angle; wraps.
@@ -25,7 +26,7 @@ pub struct Sample {
     pub emergency_stop: bool,
 }
 
-/// What a bridge does until the next tick.
+/// What a bridge does until the next tick; a platform is told it in the sense of the motor's leads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drive {
     /// All switches open: the motor is free.

@@ -67,9 +67,14 @@ impl Machine {
         matches!(self.state, State::StopDamped | State::StopBrake)
     }
 
-    /// Tells whether all motors may carry current: enabled, or stopping.
+    /// Tells whether the wrist is controlled: enabled, or stopping.
     pub const fn is_live(&self) -> bool {
         self.is_enabled() || self.is_stopping()
+    }
+
+    /// Tells whether motors carry current: controlled, or tried one by one.
+    pub fn is_powered(&self) -> bool {
+        self.is_live() || self.state == State::Test
     }
 
     /// Tells whether the motors that are not at fault brake after a fault.
@@ -79,7 +84,7 @@ impl Machine {
 
     /// Tells whether a motor may carry current.
     pub fn may_carry_current(&self, now: Instant) -> bool {
-        self.is_live() || self.brakes_after_fault(now)
+        self.is_powered() || self.brakes_after_fault(now)
     }
 
     /// Tells whether the wrist does what the head asks of it.
@@ -88,6 +93,25 @@ impl Machine {
             self.state,
             State::Run | State::Hold | State::Moment | State::Motor | State::Damped | State::Brake
         )
+    }
+
+    /// Begins to try single motors, where nothing is enabled or latched. Tells whether it does.
+    pub fn begin_test(&mut self, now: Instant) -> bool {
+        let may = matches!(
+            self.state,
+            State::NotReady | State::SwitchedOff | State::Ready
+        );
+        if may {
+            self.enter(now, State::Test);
+        }
+        may
+    }
+
+    /// Ends that, where nothing else has.
+    pub fn end_test(&mut self, now: Instant) {
+        if self.state == State::Test {
+            self.enter(now, State::NotReady);
+        }
     }
 
     /// Takes the mode of a target frame. A latched state stays while `cleared` is false.

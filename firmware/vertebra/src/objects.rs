@@ -6,6 +6,7 @@ use eel_protocol::dictionary::Field;
 use eel_units::{Angle, Duration, Instant, Temperature, Torque};
 
 use crate::core::Core;
+use crate::encoder::Encoder;
 use crate::io::Sample;
 
 /// Microradians in a radian.
@@ -141,7 +142,15 @@ impl Core {
             | Field::WindingCapacity
             | Field::HousingCapacity
             | Field::WindingLimit
-            | Field::Ambient => self.settings.value(field).unwrap_or_default(),
+            | Field::Ambient
+            | Field::CalibrationSerial
+            | Field::Zero1
+            | Field::Zero2
+            | Field::Zero3
+            | Field::Offset1
+            | Field::Offset2
+            | Field::Offset3
+            | Field::Reversed => self.settings.value(field).unwrap_or_default(),
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
             Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
@@ -161,6 +170,12 @@ impl Core {
             Field::SyncPhase => self.timing.sync_phase_us,
             Field::CurrentLoopLast => i64::from(self.timing.current_loop_ns.0),
             Field::CurrentLoopMax => i64::from(self.timing.current_loop_ns.1),
+            Field::ProcedureStep => 0,
+            Field::ProcedureProgress => self.procedure.progress as i64,
+            Field::ProcedureReason => self.procedure.reason as i64,
+            Field::ProcedureMotor => i64::from(self.procedure.motor),
+            Field::ProcedureChecks => i64::from(self.procedure.checks),
+            Field::ProcedureFailed => i64::from(self.procedure.failed),
             // The rest is served beside the core, or streams.
             Field::ScopeChannel1
             | Field::ScopeChannel2
@@ -206,6 +221,7 @@ impl Core {
             Field::MotorTorque1 => return self.set_motor_torque(0, value),
             Field::MotorTorque2 => return self.set_motor_torque(1, value),
             Field::MotorTorque3 => return self.set_motor_torque(2, value),
+            Field::ProcedureStep => return self.order_procedure(value as u8),
             _ => return self.set_setting(field, value),
         }
         Ok(())
@@ -227,8 +243,12 @@ impl Core {
         if self.machine.may_carry_current(self.now) || self.operational {
             return Err(Abort::DeviceState);
         }
+        let before = self.settings.calibration;
         if !self.settings.set(field, value) {
             return Err(Abort::ReadOnly);
+        }
+        if self.settings.calibration != before {
+            self.encoders = [Encoder::new(&self.settings.motor); 3];
         }
         self.prepare();
         Ok(())

@@ -3,7 +3,7 @@
 use eel_kinematics::Joints;
 use eel_protocol::Condition;
 use eel_protocol::emergency::{Emergency, Source};
-use eel_units::{Angle, Temperature, Torque};
+use eel_units::{Angle, Current, Temperature, Torque};
 
 use crate::command::TARGET_TIMEOUT;
 use crate::core::Core;
@@ -16,6 +16,9 @@ use crate::workspace::is_believable;
 
 /// Largest difference between the measured angles and those of the measured pose: 1 mrad.
 const RESIDUAL_LIMIT: Angle = Angle::from_milliradians(1);
+
+/// Current that a sensor may read while its bridge is off: 100 mA.
+const IDLE_CURRENT: Current = Current::from_milliamps(100);
 
 /// Deviation from the reference that is worth a warning: 150 mrad.
 const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
@@ -62,6 +65,11 @@ impl Core {
                 Condition::Settings,
                 self.settings_lost || !self.settings.are_sound(),
             )
+            .with(
+                Condition::Calibration,
+                self.settings.calibration.serial != self.settings.serial,
+            )
+            .with(Condition::CurrentOffset, self.reads_idle_current(sample))
             .with(Condition::Encoders, !aligned)
             .with(Condition::Pose, aligned && !believable)
             .with(Condition::Voltage, voltage)
@@ -69,6 +77,22 @@ impl Core {
             .with(Condition::Bridge, sample.bridge_fault.contains(&true))
             .with(Condition::EmergencyStop, sample.emergency_stop)
             .with(Condition::NotOperational, !self.operational);
+    }
+
+    /// Tells whether a current sensor reads a current that can't be, the bridges being off.
+    fn reads_idle_current(&mut self, sample: &Sample) -> bool {
+        if self.is_open != [true; 3] {
+            self.idle = [0; 3];
+            return false;
+        }
+        let mut is_wrong = false;
+        for (idle, current) in self.idle.iter_mut().zip(sample.current) {
+            // A low pass of 64 ticks.
+            *idle += i64::from(current.to_microamps()) - *idle / 64;
+            is_wrong |=
+                (*idle / 64).unsigned_abs() > u64::from(IDLE_CURRENT.to_microamps().unsigned_abs());
+        }
+        is_wrong
     }
 
     /// Finds what is wrong with this vertebra: some of it always, some while its drives are on.
@@ -79,7 +103,7 @@ impl Core {
         if let Some(motor) = sample.bridge_fault.iter().position(|fault| *fault) {
             self.pending.fault(Emergency::BRIDGE_FAULT, Some(motor), 0);
         }
-        if !self.machine.is_live() {
+        if !self.machine.is_powered() {
             return;
         }
         let limits = &self.settings.limits;

@@ -7,7 +7,9 @@ use eel_protocol::NodeId;
 use eel_protocol::dictionary::Field;
 use eel_units::{Angle, AngularVelocity, Current, Temperature, Torque, Voltage};
 
+use crate::calibration::{Calibration, Senses};
 use crate::current::{INDUCTANCES, RESISTANCES, TORQUE_CONSTANTS};
+use crate::objects::microradians;
 
 /// Everything that is set for one vertebra.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +28,8 @@ pub struct Settings {
     pub limits: Limits,
     /// What its motors are.
     pub motor: Motor,
+    /// How its motors and encoders are built in.
+    pub calibration: Calibration,
 }
 
 /// The impedance of the wrist about the base axes x (yaw), y (pitch), z (roll).
@@ -128,7 +132,8 @@ pub struct ThermalData {
 }
 
 impl Settings {
-    /// Returns the settings of the prototype for the vertebra `node` with the board `serial`.
+    /// Returns the settings of a prototype that was built in without a fault, for the vertebra `node` with
+    /// the board `serial`. A board of which nothing is known yet has [`Calibration::NONE`].
     pub const fn prototype(node: NodeId, serial: u32) -> Self {
         let mut settings = Self::unconfigured(serial);
         settings.node = Some(node);
@@ -145,6 +150,7 @@ impl Settings {
             gains: Gains::PROTOTYPE,
             limits: Limits::PROTOTYPE,
             motor: Motor::PROTOTYPE,
+            calibration: Calibration::ideal(serial),
         }
     }
 
@@ -209,6 +215,7 @@ impl Settings {
         let [stiffness_x, stiffness_y, stiffness_z] = gains.stiffness.map(i64::from);
         let [damping_x, damping_y, damping_z] = gains.damping.map(i64::from);
         let (friction, thermal) = (&self.motor.friction, &self.motor.thermal);
+        let calibration = &self.calibration;
         let angle = |angle: Angle| i64::from(angle.to_tenth_milliradians());
         Some(match field {
             Field::StiffnessX => stiffness_x,
@@ -231,6 +238,14 @@ impl Settings {
             Field::HousingCapacity => i64::from(thermal.housing_capacity),
             Field::WindingLimit => i64::from(thermal.winding_limit.to_decidegrees()),
             Field::Ambient => i64::from(thermal.ambient.to_decidegrees()),
+            Field::CalibrationSerial => i64::from(calibration.serial),
+            Field::Zero1 => microradians(calibration.zero[0]),
+            Field::Zero2 => microradians(calibration.zero[1]),
+            Field::Zero3 => microradians(calibration.zero[2]),
+            Field::Offset1 => i64::from(calibration.offset[0].to_microamps()),
+            Field::Offset2 => i64::from(calibration.offset[1].to_microamps()),
+            Field::Offset3 => i64::from(calibration.offset[2].to_microamps()),
+            Field::Reversed => i64::from(calibration.senses.to_bits()),
             _ => return None,
         })
     }
@@ -241,6 +256,9 @@ impl Settings {
         let angle = Angle::from_tenth_milliradians(value as i16);
         let (gains, limits) = (&mut self.gains, &mut self.limits);
         let (friction, thermal) = (&mut self.motor.friction, &mut self.motor.thermal);
+        let calibration = &mut self.calibration;
+        let reading = Angle::from_microradians(value as i32);
+        let offset = Current::from_microamps(value as i32);
         match field {
             Field::StiffnessX => gains.stiffness[0] = value as u32,
             Field::StiffnessY => gains.stiffness[1] = value as u32,
@@ -272,6 +290,14 @@ impl Settings {
                 thermal.winding_limit = Temperature::from_decidegrees(value as i32);
             }
             Field::Ambient => thermal.ambient = Temperature::from_decidegrees(value as i32),
+            Field::CalibrationSerial => calibration.serial = value as u32,
+            Field::Zero1 => calibration.zero[0] = reading,
+            Field::Zero2 => calibration.zero[1] = reading,
+            Field::Zero3 => calibration.zero[2] = reading,
+            Field::Offset1 => calibration.offset[0] = offset,
+            Field::Offset2 => calibration.offset[1] = offset,
+            Field::Offset3 => calibration.offset[2] = offset,
+            Field::Reversed => calibration.senses = Senses::from_bits(value as u16),
             _ => return false,
         }
         true

@@ -15,6 +15,7 @@ use crate::events::Event;
 use crate::freezing::Clock;
 use crate::io::{Drive, Sample};
 use crate::keepsake::{Keepsake, Kept};
+use crate::procedure::Hands;
 use crate::records::Records;
 use crate::served::Served;
 use crate::settings::Settings;
@@ -201,6 +202,11 @@ impl Vertebra {
     /// Returns what was kept of the last fault or stop.
     pub fn freeze_frame(&self) -> Option<FreezeFrame> {
         self.core.freeze
+    }
+
+    /// Returns what a procedure waits for somebody's hands to do.
+    pub fn waits_for(&self) -> Option<Hands> {
+        self.core.procedure.waits_for()
     }
 
     /// Returns how warm each motor's winding is by the model.

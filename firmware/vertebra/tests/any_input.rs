@@ -76,6 +76,10 @@ fn check(bench: &Bench, before: State) {
         }
         State::Brake | State::StopBrake => assert_eq!(drives, [Drive::Brake; 3]),
         State::Fault => assert!(!bench.is_driven(), "{drives:?}"),
+        State::Test => {
+            let driven = drives.iter().filter(|it| **it != Drive::Off).count();
+            assert!(driven <= 1, "one motor at a time: {drives:?}");
+        }
         State::Run
         | State::Hold
         | State::Moment
@@ -129,6 +133,8 @@ fn is_legal(from: State, to: State) -> bool {
         (State::Ready, State::SwitchedOff | State::StopDamped) => true,
         (State::NotReady, State::SwitchedOff) | (State::SwitchedOff, State::Ready) => true,
         (State::StopDamped, State::StopBrake) => true,
+        // Tried while nothing is enabled; it ends where it may have begun.
+        (State::NotReady | State::SwitchedOff | State::Ready, State::Test) => true,
         // After a fault reset the same turn's checks may already allow enabling.
         (from, State::SwitchedOff | State::Ready) => from.is_latched(),
         _ => false,
@@ -243,9 +249,14 @@ fn frame(bench: &mut Bench, random: &mut Random) -> Frame {
 /// a test can go on with.
 fn write(random: &mut Random) -> [u8; 8] {
     let index = random.pick(&[
-        0x2000_u16, 0x2001, 0x2020, 0x2020, 0x2020, 0x2030, 0x1017, 0x1400,
+        0x2000_u16, 0x2001, 0x2020, 0x2020, 0x2020, 0x2030, 0x2060, 0x1017, 0x1400,
     ]);
-    let length = random.pick(&[1_u8, 2, 4]);
+    let is_procedure = index == 0x2060;
+    let length = if is_procedure {
+        1
+    } else {
+        random.pick(&[1_u8, 2, 4])
+    };
     let [low, high] = index.to_le_bytes();
     let value = random
         .pick(&[random.0 as u32, 0, 1, 4_000, u32::MAX])
@@ -255,8 +266,16 @@ fn write(random: &mut Random) -> [u8; 8] {
         0x23 | (4 - length) << 2,
         low,
         high,
-        random.below(13) as u8,
-        a,
+        if is_procedure {
+            1
+        } else {
+            random.below(13) as u8
+        },
+        if is_procedure {
+            random.below(6) as u8
+        } else {
+            a
+        },
         b,
         c,
         d,

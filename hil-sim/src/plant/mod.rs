@@ -18,6 +18,7 @@ pub mod integrate;
 pub mod joint;
 pub mod measures;
 pub mod motor;
+mod mounting;
 mod power;
 pub mod random;
 #[cfg(test)]
@@ -35,8 +36,16 @@ use chain::{Chain, Load, Motion, Push, State};
 pub use config::Config;
 pub use defect::{Defect, Defects};
 use joint::{Pull, Stops, Target, Tracking};
+pub use mounting::Mounting;
 pub use view::BodyState;
 use wrist::Wrist;
+
+/// How hands hold a joint: firmly, and without an inertia of their own.
+const HANDS: Tracking = Tracking {
+    stiffness: 100.0,
+    damping: 10.0,
+    inertia: 0.0,
+};
 
 /// The eel, its water and its motors at one moment.
 #[derive(Clone, Debug)]
@@ -51,6 +60,8 @@ pub struct Plant {
     /// How far the stream has carried the eel, m.
     carried: Vec3,
     supply_v: f64,
+    /// Where somebody's hands hold a joint.
+    hands: [Option<Target>; JOINTS],
     moments: [Vec3; JOINTS],
     power_w: f64,
     energy_j: f64,
@@ -74,6 +85,7 @@ impl Plant {
             stream: Vec3(config.water.map_or([0.0; 3], |water| water.stream_m_s)),
             carried: Vec3::ZERO,
             supply_v: config.supply_v,
+            hands: [None; JOINTS],
             moments: [Vec3::ZERO; JOINTS],
             power_w: 0.0,
             energy_j: 0.0,
@@ -90,6 +102,11 @@ impl Plant {
             let (rotation, rate) = (&motion.rotations[joint + 1], self.state.rates[joint]);
             let (wrist, drives) = (&mut self.wrists[joint], &drives[joint]);
             *load = wrist.load(&self.config, drives, self.supply_v, rotation, rate);
+            if let Some(target) = &self.hands[joint] {
+                let (_, hand) = HANDS.load(target, rotation, rate, self.config.step_s);
+                load.moment += hand.moment;
+                load.implicit += hand.implicit;
+            }
         }
         let accelerations = self.advance(&motion, &mut loads);
         let mut drawn_a = 0.0;
@@ -173,6 +190,22 @@ impl Plant {
     /// With a joint beyond 9.
     pub fn defects_mut(&mut self, joint: usize) -> &mut Defects {
         self.wrists[joint].defects_mut()
+    }
+
+    /// Builds the motors of vertebra `joint + 1` in otherwise than ideally.
+    ///
+    /// # Panics
+    /// With a joint beyond 9.
+    pub fn set_mounting(&mut self, joint: usize, mounting: [Mounting; 3]) {
+        self.wrists[joint].set_mounting(mounting);
+    }
+
+    /// Lets somebody's hands hold a joint, or let go of it.
+    ///
+    /// # Panics
+    /// With a joint beyond 9.
+    pub fn set_hands(&mut self, joint: usize, hold: Option<Target>) {
+        self.hands[joint] = hold;
     }
 
     /// Sets the battery's voltage without load from now on, V.

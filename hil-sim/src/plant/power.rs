@@ -17,8 +17,17 @@ const CONVERTER_STEP_UA: f64 = 3_222.656;
 pub struct Supply {
     /// Voltage at the bridges.
     pub volts: f64,
-    /// What each current reads too much, A.
-    pub wrong_a: [f64; 3],
+    /// How each current is measured.
+    pub sensors: [Sensor; 3],
+}
+
+/// A current sensor in line with a motor's leads.
+#[derive(Clone, Copy, Debug)]
+pub struct Sensor {
+    /// −1 where the leads are exchanged, for the bridge's voltage as well.
+    pub sign: f64,
+    /// What it reads without a current, A.
+    pub offset_a: f64,
 }
 
 /// The bridges of three motors.
@@ -54,17 +63,19 @@ impl Power {
     ) -> [Bridge; 3] {
         let is_driven = drives.map(|drive| matches!(drive, Drive::Current(_)));
         self.drawn_a = [0.0; 3];
-        let (supply_v, wrong_a) = (supply.volts, supply.wrong_a);
+        let (supply_v, sensors) = (supply.volts, supply.sensors);
         let supply = Voltage::from_millivolts(libm::round(supply_v * 1e3) as i32);
         self.current_loop.set(drives, supply);
         let periods = libm::round(step * f64::from(CURRENT_LOOP_HZ)).max(1.0);
         let mut sums = [0.0; 3];
         if is_driven.contains(&true) {
             for _ in 0..periods as usize {
-                let measured = std::array::from_fn(|i| converted(motors[i].current_a + wrong_a[i]));
+                let measured = std::array::from_fn(|i| {
+                    converted(sensors[i].sign * motors[i].current_a + sensors[i].offset_a)
+                });
                 let decided = self.current_loop.update(measured);
                 for i in (0..3).filter(|i| is_driven[*i]) {
-                    let volts = voltage(self.acting[i], supply_v);
+                    let volts = sensors[i].sign * voltage(self.acting[i], supply_v);
                     let before = motors[i].current_a;
                     let after = if self.current_loop.tripped()[i] {
                         0.0
@@ -119,7 +130,10 @@ mod tests {
 
     const FULL: Supply = Supply {
         volts: 24.0,
-        wrong_a: [0.0; 3],
+        sensors: [Sensor {
+            sign: 1.0,
+            offset_a: 0.0,
+        }; 3],
     };
 
     /// Spins a lone motor with a load by the loop for a second, in steps; returns its speed at the end.

@@ -8,7 +8,8 @@ use super::chain::Load;
 use super::config::{Config, Motor};
 use super::defect::Defects;
 use super::motor::{self, Bridge, Line, MotorState};
-use super::power::{Power, Supply};
+use super::mounting::Mounting;
+use super::power::{Power, Sensor, Supply};
 use super::random::Random;
 use super::transmission::{Link, Transmission};
 
@@ -30,6 +31,7 @@ pub struct Wrist {
     offsets: [i32; 3],
     random: Random,
     defects: Defects,
+    mounting: [Mounting; 3],
     started: bool,
 }
 
@@ -53,6 +55,7 @@ impl Wrist {
             offsets: std::array::from_fn(|_| random.within(1 << 20)),
             random,
             defects: Defects::default(),
+            mounting: [Mounting::default(); 3],
             started: false,
         }
     }
@@ -74,7 +77,10 @@ impl Wrist {
         let wrong_a = self.defects.current_error_a();
         let supply = Supply {
             volts: supply_v,
-            wrong_a,
+            sensors: std::array::from_fn(|i| Sensor {
+                sign: Mounting::sign(self.mounting[i].leads),
+                offset_a: self.mounting[i].offset_a + wrong_a[i],
+            }),
         };
         self.bridges = self
             .power
@@ -123,6 +129,11 @@ impl Wrist {
         std::array::from_fn(|i| motor.constant * self.motors[i].current_a)
     }
 
+    /// Builds its motors and sensors in otherwise than ideally.
+    pub fn set_mounting(&mut self, mounting: [Mounting; 3]) {
+        self.mounting = mounting;
+    }
+
     /// Returns what is wrong with it.
     pub fn defects_mut(&mut self) -> &mut Defects {
         &mut self.defects
@@ -151,11 +162,20 @@ impl Wrist {
         let angles = self.angles(rotation);
         let counts_per_radian = config.motor.counts_per_turn / std::f64::consts::TAU;
         let encoder_counts = std::array::from_fn(|i| {
-            (libm::floor(angles[i] * counts_per_radian) as i32).wrapping_add(self.offsets[i])
+            let counted = libm::floor(angles[i] * counts_per_radian) as i32;
+            let counted = if self.mounting[i].counter {
+                -counted
+            } else {
+                counted
+            };
+            counted.wrapping_add(self.offsets[i])
         });
-        let absolute = std::array::from_fn(|i| Some(self.absolute(angles[i])));
+        let absolute =
+            std::array::from_fn(|i| Some(self.absolute(self.mounting[i].read(angles[i]))));
         let current = std::array::from_fn(|i| {
-            let milliamps = libm::round(self.motors[i].take_mean_current() * 1e3) as i32;
+            let mounting = self.mounting[i];
+            let mean = Mounting::sign(mounting.leads) * self.motors[i].take_mean_current();
+            let milliamps = libm::round((mean + mounting.offset_a) * 1e3) as i32;
             Current::from_milliamps(milliamps + self.random.within(1))
         });
         self.defects.spoil(Sample {

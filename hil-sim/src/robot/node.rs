@@ -3,7 +3,7 @@
 use eel_protocol::{Frame, NodeId, State};
 use eel_units::Instant;
 use eel_vertebra::store::{self, RamFlash, Store};
-use eel_vertebra::{Drive, Event, Keepsake, Sample, Settings, Vertebra, turn};
+use eel_vertebra::{Calibration, Drive, Event, Keepsake, Sample, Settings, Vertebra, turn};
 
 /// Everything that went into a turn and came out of it.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +94,16 @@ impl NativeNode {
             kept: Keepsake::EMPTY,
             vertebra: Vertebra::new(settings, Instant::ZERO),
         }
+    }
+}
+
+impl NativeNode {
+    /// Returns the same vertebra as it is before its first calibration, with an empty flash.
+    pub fn uncalibrated(&self) -> Self {
+        Self::with_settings(Settings {
+            calibration: Calibration::NONE,
+            ..self.settings
+        })
     }
 }
 

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
-use crate::active::{Drive, Faults, Head, Lss, Nmt, Nodes, Read, Scope, Store, Write};
+use crate::active::{
+    Calibrate, Drive, Faults, Head, Lss, Nmt, Nodes, Read, Scope, SelfTest, Store, Write,
+};
 use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
 use crate::source::Limits;
@@ -33,6 +35,8 @@ Examples:
   eel write 3 gains.peak_torque=2.5           in N.m, range-checked
   eel faults 3                                what stopped vertebra 3, and how it was
   eel scope 3 pose.yaw motor.angle1           every millisecond for half a second, plotted
+  eel calibrate 3 --yes                       zeros, offsets and senses of vertebra 3, step by step
+  eel self-test 3 --yes                       its sensors and bridges
   eel drive 3 pose --yaw 10 --degrees         vertebra 3 by hand
   eel head vcan0 --gait swim --seconds 20     lead simulated vertebrae through a gait
   eel wrist ik --yaw 20 --degrees             motor angles for a pose; eel wrist --help says more";
@@ -68,6 +72,8 @@ pub enum Command {
     Nmt(Nmt),
     Lss(Lss),
     Store(Store),
+    Calibrate(Calibrate),
+    SelfTest(SelfTest),
     Drive(Drive),
     Head(Head),
 }
@@ -81,7 +87,18 @@ const GROUPS: [(&str, &[&str]); 3] = [
     (
         "Ask and command nodes (these send)",
         &[
-            "nodes", "read", "write", "faults", "scope", "nmt", "lss", "store", "drive", "head",
+            "nodes",
+            "read",
+            "write",
+            "faults",
+            "scope",
+            "nmt",
+            "lss",
+            "store",
+            "calibrate",
+            "self-test",
+            "drive",
+            "head",
         ],
     ),
     ("Without a bus", &["export", "wrist"]),
@@ -98,7 +115,7 @@ fn command() -> clap::Command {
                 .find_subcommand(name)
                 .and_then(clap::Command::get_about);
             let about = about.map(ToString::to_string).unwrap_or_default();
-            template.push_str(&format!("  {name:<8}{about}\n"));
+            template.push_str(&format!("  {name:<10}{about}\n"));
         }
     }
     template.push_str("\nOptions:\n{options}{after-help}");
@@ -304,7 +321,7 @@ mod tests {
             command()
                 .render_help()
                 .to_string()
-                .contains("  nmt     Command")
+                .contains("  nmt       Command")
         );
     }
 }

@@ -66,6 +66,8 @@ fn main() -> ExitCode {
         Command::Nmt(nmt) => nmt.run(),
         Command::Lss(lss) => lss.run(),
         Command::Store(store) => store.run(),
+        Command::Calibrate(calibrate) => calibrate.run(),
+        Command::SelfTest(test) => test.run(),
         Command::Head(head) => head.run(),
     };
     match result {

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use eel_protocol::procedure::{Check, Progress, Reason};
 use eel_protocol::{LimitCode, Mode, State, Status, dictionary, emergency};
 use serde_json::json;
 
@@ -153,7 +154,7 @@ fn words(object: &Object, raw: i64) -> Option<String> {
         (0x2000, 4) => Some(format!("{}, counter {high}", Mode::from_code(low)?.name())),
         (0x2010, 4) => Some(format!("{}, counter {high}", State::from_code(low)?.name())),
         (0x2010, 6) => {
-            let conditions = Status::from_bits(word).conditions();
+            let conditions = Status::from_bits(long).conditions();
             let names: Vec<_> = conditions.map(eel_protocol::Condition::name).collect();
             Some(if names.is_empty() {
                 "nothing in the way".to_owned()
@@ -165,6 +166,17 @@ fn words(object: &Object, raw: i64) -> Option<String> {
             let codes = [low, high as u8, (word >> 8 & 0xF) as u8];
             let names = codes.map(|code| LimitCode::from_code(code).map_or("?", LimitCode::name));
             Some(names.join(", "))
+        }
+        (0x2060, 2) => Some(format!("{:?}", Progress::from_code(low)?).to_lowercase()),
+        (0x2060, 3) => Some(Reason::from_code(word as u8)?.sentence().to_owned()),
+        (0x2060, 5 | 6) => {
+            let checks = Check::ALL.iter().filter(|check| word & check.mask() != 0);
+            let names: Vec<_> = checks.map(|check| check.name()).collect();
+            Some(if names.is_empty() {
+                "none".to_owned()
+            } else {
+                names.join(", ")
+            })
         }
         _ => None,
     }
@@ -297,11 +309,14 @@ mod tests {
         assert_eq!(shown("device.name", b"a\x1b[2J"), "a\u{FFFD}[2J");
         assert_eq!(shown("identity.serial", &[4, 3, 2, 1]), "0x01020304");
         assert_eq!(shown("pose.code", &[0x53]), "83  run, counter 5");
-        assert_eq!(shown("pose.status", &[0, 0]), "0  nothing in the way");
+        assert_eq!(shown("pose.status", &[0, 0, 0, 0]), "0  nothing in the way");
         assert_eq!(
-            shown("pose.status", &[0, 9]),
-            "2304  not-operational, head-lost"
+            shown("pose.status", &[0, 9, 1, 0]),
+            "67840  not-operational, head-lost, calibration"
         );
+        assert_eq!(shown("procedure.progress", &[2]), "2  done");
+        assert_eq!(shown("procedure.failed", &[8, 2]), "520  noise, bridges");
+        assert!(shown("procedure.reason", &[7]).contains("did not move its crank"));
         assert_eq!(
             shown("error.newest", &[0x30, 0x81, 0x7F, 0]),
             "0x007F8130  head-lost"

@@ -18,21 +18,35 @@ pub struct Nodes {
 impl Nodes {
     /// Powers some up that have their ids.
     pub fn start(interface: &str, chosen: Vec<NodeId>) -> Self {
-        Self::power(interface, chosen, Vec::new())
+        Self::power(interface, chosen, Vec::new(), 1, None)
     }
 
     /// Powers some up that have no ids yet.
     pub fn unconfigured(interface: &str, places: Vec<NodeId>) -> Self {
-        Self::power(interface, Vec::new(), places)
+        Self::power(interface, Vec::new(), places, 1, None)
     }
 
-    fn power(interface: &str, chosen: Vec<NodeId>, unconfigured: Vec<NodeId>) -> Self {
+    /// Powers one up that was never calibrated.
+    pub fn uncalibrated(interface: &str, id: NodeId, seed: u64) -> Self {
+        Self::power(interface, vec![id], Vec::new(), seed, Some(id))
+    }
+
+    fn power(
+        interface: &str,
+        chosen: Vec<NodeId>,
+        unconfigured: Vec<NodeId>,
+        seed: u64,
+        uncalibrated: Option<NodeId>,
+    ) -> Self {
         let bus = SocketBus::open(interface).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&stop);
         let thread = thread::spawn(move || {
             let plant = Config::default();
-            let mut nodes = Realtime::with_unconfigured(bus, &plant, 1, &chosen, &unconfigured);
+            let mut nodes = Realtime::with_unconfigured(bus, &plant, seed, &chosen, &unconfigured);
+            if let Some(id) = uncalibrated {
+                nodes.uncalibrate(id, seed);
+            }
             nodes.run(|_| !told.load(Ordering::Relaxed)).unwrap()
         });
         Self {

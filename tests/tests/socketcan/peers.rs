@@ -43,9 +43,9 @@ fn canopen_cli_reads_writes_and_starts_a_vertebra() {
         refusal.to_lowercase().contains("06020000") || refusal.contains("ObjectDoesNotExist"),
         "{refusal}"
     );
-    assert_eq!(read("2010:6", "u16"), "Unsigned16(256)", "not operational");
+    assert_eq!(read("2010:6", "u32"), "Unsigned32(256)", "not operational");
     say(&["nmt", &name, "start", "3"]);
-    assert_eq!(read("2010:6", "u16"), "Unsigned16(0)", "nothing in the way");
+    assert_eq!(read("2010:6", "u32"), "Unsigned32(0)", "nothing in the way");
     let sheet = say(&["eds", "docs/generated/vertebra.eds"]);
     for (object, sub) in eel_protocol::dictionary::entries() {
         let entry = format!("0x{:04x}:{:02x}", object.index, sub.subindex);

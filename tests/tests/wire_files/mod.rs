@@ -9,7 +9,7 @@ use eel_canopen::{Abort, Frame};
 use eel_protocol::NodeId;
 use eel_protocol::export::{write_dbc, write_eds, write_markdown};
 use eel_units::Instant;
-use eel_vertebra::{Settings, Vertebra};
+use eel_vertebra::{Calibration, Settings, Vertebra};
 
 const NODE: u8 = 7;
 const SERIAL: u32 = 0x1234_5678;
@@ -94,7 +94,11 @@ struct Client {
 
 impl Client {
     fn new() -> Self {
-        let settings = Settings::prototype(NodeId::new(NODE).unwrap(), SERIAL);
+        // As a board leaves the factory: nobody has calibrated it.
+        let settings = Settings {
+            calibration: Calibration::NONE,
+            ..Settings::prototype(NodeId::new(NODE).unwrap(), SERIAL)
+        };
         Self {
             vertebra: Vertebra::new(settings, Instant::from_micros(0)),
         }

@@ -6,6 +6,7 @@
 //! entries by a `match` over [`Field`], so the compiler refuses a table entry that nobody serves.
 
 mod served;
+mod shapes;
 mod table;
 
 use core::fmt;
@@ -16,7 +17,7 @@ pub use served::{ENTRIES, Served, highest, served};
 pub use table::{Field, OBJECTS};
 
 /// The records whose entries are settings.
-const SETTINGS: [u16; 2] = [0x2020, 0x2023];
+const SETTINGS: [u16; 3] = [0x2020, 0x2022, 0x2023];
 
 /// How an entry lies on the wire; integers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,223 +2,11 @@
 
 use eel_canopen::Access;
 
-use super::{DataType, Object, Pdo, Scale, Sub};
+use super::shapes::*;
+use super::{DataType, Object, Pdo, Sub};
 
-use Access::{Constant as CONST, ReadOnly as RO, ReadWrite as RW};
+use Access::{ReadOnly as RO, ReadWrite as RW};
 use Pdo::{No as NO, Receive as RX, Transmit as TX};
-
-/// What an entry holds, whatever its type: the part that the table repeats.
-#[derive(Clone, Copy)]
-struct Shape {
-    data_type: DataType,
-    access: Access,
-    pdo: Pdo,
-    unit: &'static str,
-    scale: Scale,
-    default: i64,
-    min: i64,
-    max: i64,
-}
-
-/// Makes the shape of a number without a unit that uses its type's whole range.
-const fn raw(data_type: DataType, access: Access, pdo: Pdo) -> Shape {
-    let (min, max) = data_type.range();
-    Shape {
-        data_type,
-        access,
-        pdo,
-        unit: "",
-        scale: scale(1, 1),
-        default: 0,
-        min,
-        max,
-    }
-}
-
-/// Makes a scale.
-const fn scale(numerator: u32, denominator: u32) -> Scale {
-    assert!(denominator != 0);
-    Scale {
-        numerator,
-        denominator,
-    }
-}
-
-/// Makes the shape of a number in `unit`, one step being a thousandth of it.
-const fn thousandths(data_type: DataType, access: Access, pdo: Pdo, unit: &'static str) -> Shape {
-    Shape {
-        unit,
-        scale: scale(1, 1_000),
-        ..raw(data_type, access, pdo)
-    }
-}
-
-const fn angle(access: Access, pdo: Pdo) -> Shape {
-    Shape {
-        unit: "rad",
-        scale: scale(1, 10_000),
-        ..raw(DataType::I16, access, pdo)
-    }
-}
-
-const fn torque(access: Access, pdo: Pdo) -> Shape {
-    thousandths(DataType::I16, access, pdo, "N.m")
-}
-
-const fn byte(access: Access, pdo: Pdo) -> Shape {
-    raw(DataType::U8, access, pdo)
-}
-
-const fn word(access: Access, pdo: Pdo) -> Shape {
-    raw(DataType::U16, access, pdo)
-}
-
-const fn stiffness(default: i64) -> Shape {
-    let shape = thousandths(DataType::U32, RW, NO, "N.m/rad");
-    Shape {
-        default,
-        max: 500_000,
-        ..shape
-    }
-}
-
-const fn damping(default: i64) -> Shape {
-    let shape = thousandths(DataType::U32, RW, NO, "N.m.s/rad");
-    Shape {
-        default,
-        max: 50_000,
-        ..shape
-    }
-}
-
-/// Half the workspace about one axis: never beyond the range the wrist is built for.
-const fn half_range(default: i64) -> Shape {
-    Shape {
-        default,
-        min: 1,
-        max: default,
-        ..angle(RW, NO)
-    }
-}
-
-const STIFFNESS_SCALE: Shape = Shape {
-    scale: scale(1, 32_768),
-    default: 32_768,
-    ..word(RW, RX)
-};
-const PEAK_TORQUE: Shape = Shape {
-    default: 3_000,
-    min: 1,
-    max: 32_000,
-    ..thousandths(DataType::U16, RW, NO, "N.m")
-};
-const RATE_LIMIT: Shape = Shape {
-    default: 6_000,
-    min: 1,
-    max: 20_000,
-    ..thousandths(DataType::U16, RW, NO, "rad/s")
-};
-const MICRORADIANS: Shape = Shape {
-    unit: "rad",
-    scale: scale(1, 1_000_000),
-    ..raw(DataType::I32, RO, TX)
-};
-const ARCHITECTURE: Shape = Shape {
-    default: 3,
-    min: 3,
-    max: 3,
-    ..byte(CONST, NO)
-};
-const SCALE: Shape = Shape {
-    unit: "m",
-    scale: scale(1, 1_000_000),
-    default: 40_000,
-    min: 40_000,
-    max: 40_000,
-    ..raw(DataType::U32, CONST, NO)
-};
-const SUPPLY: Shape = thousandths(DataType::U16, RO, TX, "V");
-const TEMPERATURE: Shape = Shape {
-    unit: "degC",
-    scale: scale(1, 10),
-    ..raw(DataType::I16, RO, TX)
-};
-const COUNT: Shape = raw(DataType::U32, RO, TX);
-const MICROSECONDS: Shape = Shape {
-    unit: "s",
-    scale: scale(1, 1_000_000),
-    ..raw(DataType::U16, RO, TX)
-};
-const NANOSECONDS: Shape = Shape {
-    unit: "s",
-    scale: scale(1, 1_000_000_000),
-    ..raw(DataType::U16, RO, TX)
-};
-const FRICTION: Shape = Shape {
-    default: 60,
-    max: 1_000,
-    ..thousandths(DataType::U16, RW, NO, "N.m")
-};
-const FRICTION_VISCOUS: Shape = Shape {
-    default: 20,
-    max: 1_000,
-    ..thousandths(DataType::U16, RW, NO, "N.m.s/rad")
-};
-const FRICTION_SPEED: Shape = Shape {
-    default: 50,
-    min: 1,
-    max: 5_000,
-    ..thousandths(DataType::U16, RW, NO, "rad/s")
-};
-const fn thermal_resistance(default: i64) -> Shape {
-    Shape {
-        default,
-        min: 10,
-        max: 1_000_000,
-        ..thousandths(DataType::U32, RW, NO, "K/W")
-    }
-}
-const fn heat_capacity(default: i64) -> Shape {
-    Shape {
-        default,
-        min: 100,
-        max: 10_000_000,
-        ..thousandths(DataType::U32, RW, NO, "J/K")
-    }
-}
-const fn limit_temperature(default: i64) -> Shape {
-    Shape {
-        default,
-        min: -400,
-        max: 2_000,
-        access: RW,
-        pdo: NO,
-        ..TEMPERATURE
-    }
-}
-const SYNC_PHASE: Shape = Shape {
-    data_type: DataType::I16,
-    min: -32_768,
-    max: 32_767,
-    ..MICROSECONDS
-};
-const DOMAIN: Shape = raw(DataType::Domain, RO, NO);
-const CHANNEL: Shape = raw(DataType::U32, RW, NO);
-const DIVIDER: Shape = Shape {
-    default: 1,
-    min: 1,
-    ..word(RW, NO)
-};
-const TRIGGER: Shape = Shape {
-    max: 2,
-    ..byte(RW, NO)
-};
-const LINK_DATA: Shape = raw(DataType::Domain, RW, NO);
-const LINK_LENGTH: Shape = Shape {
-    default: 889,
-    max: 0x00FF_FFFF,
-    ..raw(DataType::U32, RW, NO)
-};
 
 /// Makes an entry from its shape.
 const fn sub(
@@ -309,7 +97,7 @@ records! {
             "State in the low four bits, counter 0-14 in the high four.";
         5 PoseCrc "crc" byte(RO, TX),
             "Protection byte over the seven bytes before it and the COB-ID.";
-        6 PoseStatus "status" word(RO, TX),
+        6 PoseStatus "status" STATUS,
             "Status word: why enabling is refused, and what is limited.";
     }
     EFFORT = 0x2011 "effort", "Torques of the motors and what bounds them; TPDO2." {
@@ -358,6 +146,19 @@ records! {
         1 Architecture "architecture" ARCHITECTURE,
             "Kind of wrist: 1 parallel axes, 2 orthogonal axes, 3 parallel actuators.";
         2 GeometryScale "scale" SCALE, "Length of the unit mechanism's 1, the rods.";
+    }
+    CALIBRATION = 0x2022 "calibration",
+        "How this vertebra's motors and encoders are built in; may be changed while the wrist is off." {
+        1 CalibrationSerial "serial" SERIAL,
+            "Serial number of the vertebra that it was made for: 1018:4, or enabling is refused.";
+        2 Zero1 "zero1" reading(0), "What crank 1's encoder reads at home.";
+        3 Zero2 "zero2" reading(0), "What crank 2's encoder reads at home.";
+        4 Zero3 "zero3" reading(785_398), "What crank 3's encoder reads at home.";
+        5 Offset1 "offset1" CURRENT_OFFSET, "What motor 1's current sensor reads without a current.";
+        6 Offset2 "offset2" CURRENT_OFFSET, "What motor 2's current sensor reads without a current.";
+        7 Offset3 "offset3" CURRENT_OFFSET, "What motor 3's current sensor reads without a current.";
+        8 Reversed "reversed" SENSES,
+            "What counts down as the crank turns up: bits 0-2 the leads of motors 1-3, 3-5 counters, 6-8 crank encoders.";
     }
     MOTOR_SETTINGS = 0x2023 "motor_settings",
         "What the motors are; may be changed while the wrist is off." {
@@ -418,6 +219,16 @@ records! {
             "What it does: 0 nothing, 1 fills, 2 waits for a fault, 3 captures its end, 4 full.";
         8 ScopeSamples "samples" word(RO, NO), "Samples that 2100:2 holds.";
     }
+    PROCEDURE = 0x2060 "procedure", "Calibration step by step, and the self test; only before NMT start." {
+        1 ProcedureStep "step" STEP,
+            "Writing 1 measures current offsets, 2 takes this pose for home, 3 watches yaw and roll by hand, 4 turns each motor, 5 tests, 0 ends.";
+        2 ProcedureProgress "progress" byte(RO, NO),
+            "How it goes: 0 nothing was begun, 1 it goes on, 2 done, 3 failed.";
+        3 ProcedureReason "reason" byte(RO, NO), "Why it failed, of the list in this document.";
+        4 ProcedureMotor "motor" byte(RO, NO), "The motor that something is wrong with, or 0.";
+        5 ProcedureChecks "checks" word(RO, NO), "Checks of the self test that were made, a bit each.";
+        6 ProcedureFailed "failed" word(RO, NO), "Checks of the self test that failed.";
+    }
     RECORD = 0x2100 "record", "What was recorded; read as a domain, in the layouts of docs/vertebra.md." {
         1 RecordFreeze "freeze" DOMAIN,
             "Freeze frame: everything at the moment of the last fault or stop.";
@@ -461,12 +272,14 @@ pub(super) const fn position(index: u16) -> Option<usize> {
         0x2013 => 6,
         0x2020 => 7,
         0x2021 => 8,
-        0x2023 => 9,
-        0x2030 => 10,
-        0x2040 => 11,
-        0x2050 => 12,
-        0x2100 => 13,
-        0x2101 => 14,
+        0x2022 => 9,
+        0x2023 => 10,
+        0x2030 => 11,
+        0x2040 => 12,
+        0x2050 => 13,
+        0x2060 => 14,
+        0x2100 => 15,
+        0x2101 => 16,
         _ => return None,
     })
 }

@@ -9,6 +9,7 @@ use crate::dictionary::{OBJECTS, Pdo, Sub};
 use crate::emergency::CATALOGUE;
 use crate::messages::{MESSAGES, Sender};
 use crate::pdo::{PdoDefault, RPDOS, TPDOS};
+use crate::procedure::{Check, Reason};
 use crate::status::Condition;
 use eel_canopen::Access;
 
@@ -30,7 +31,8 @@ pub fn write_markdown(out: &mut dyn Write) -> Result {
     write_pdos(out)?;
     write_dictionary(out)?;
     write_status(out)?;
-    write_emergencies(out)
+    write_emergencies(out)?;
+    write_procedure(out)
 }
 
 fn write_messages(out: &mut dyn Write) -> Result {
@@ -237,6 +239,21 @@ fn write_emergencies(out: &mut dyn Write) -> Result {
             "| {:02X} | {} | {} |",
             entry.register, entry.detail, entry.sentence
         )?;
+    }
+    Ok(())
+}
+
+fn write_procedure(out: &mut dyn Write) -> Result {
+    writeln!(out, "\n## Why a procedure failed, object 2060:3\n")?;
+    writeln!(out, "| number | meaning |\n|---|---|")?;
+    for reason in Reason::ALL {
+        writeln!(out, "| {} | {} |", *reason as u8, reason.sentence())?;
+    }
+    writeln!(out, "\n## Checks of the self test, objects 2060:5 and :6\n")?;
+    writeln!(out, "| bit | name | what it looks at |\n|---|---|---|")?;
+    for check in Check::ALL {
+        let (bit, name) = (*check as u8, check.name());
+        writeln!(out, "| {bit} | {name} | {} |", check.sentence())?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The commands that send: bring-up of nodes, their faults and signals, and the head.
 
 mod bus;
+mod calibrate;
 mod drive;
 mod events;
 mod faults;
@@ -22,6 +23,7 @@ use eel_protocol::{HEAD_NODE, VERTEBRAE};
 
 use crate::usage::Usage;
 
+pub use calibrate::{Calibrate, SelfTest};
 pub use drive::Drive;
 pub use faults::Faults;
 pub use head::Head;
