@@ -10,7 +10,7 @@
 //! | CAN | PA11 FDCAN1_RX, PA12 FDCAN1_TX | 5 V transceiver, 3.3 V logic |
 //! | bridge PWM, motors 1–3 | PA8, PA9, PA10: TIM1_CH1–3 | DRV8874, PMODE low; pull-down |
 //! | bridge direction | PB0, PB1, PB10 | PHASE |
-//! | bridge current, no pin | VREF on 3.3 V, IPROPI over 2.94 kΩ to ground, IMODE to ground | chops at 2.5 A, see below |
+//! | bridge current, no pin | VREF on 3.3 V, IPROPI over 2.94 kΩ to ground, IMODE to ground | chops at 2.5 A |
 //! | bridge wake | PC8, PC9, PC10 | nSLEEP, pulled down in the DRV8874 |
 //! | bridge fault | PC11, PC12, PD2, low when faulty | nFAULT, open drain |
 //! | emergency stop | PB12 TIM1_BKIN, high when stopped | loop to ground; a broken loop stops |
@@ -23,26 +23,9 @@
 //! | crystal | PF0, PF1 | 24 MHz |
 //! | debugging | PA13, PA14 | SWD, RTT |
 //!
-//! The bridges bound the motor current by themselves, whatever the program does: a DRV8874 ends its
-//! drive when the voltage at IPROPI, 450 µA/A into 2.94 kΩ, reaches VREF: 3.3 V / (450 µA/A · 2.94 kΩ)
-//! = 2.5 A, the prototype's limit. Other motors need another resistor at IPROPI, to 1 %, as well as
-//! another limit in the settings; without the resistor (IPROPI to ground) there is no such bound.
-//!
-//! The break input of TIM1 forces all PWM low without the CPU, which brakes the motors; the next
-//! control tick puts the bridges to sleep. A stopped crystal, a locked-up CPU and a flash error do the
-//! same inside the chip. A control tick that is 5 ms late finds the bridges switched off by the 20 kHz
-//! interrupt of the converter, where the current loop runs too, and a fault. Reset, a panic, a fault of
-//! the CPU and the watchdog leave the wake pins low: the motors are free; after each but the power's and
-//! the reset pin's reset the vertebra is stopped until the head has sent a fault reset. So it is when a
-//! programmer has started the image.
-//!
-//! Settings and a node id given by LSS are kept in the last 4 KB of the flash, see `storage.rs`; option
-//! bit DBANK must be 1, as it leaves the factory.
-//!
-//! What is shown here by tests: that the image links with the pins' alternate functions as the HAL
-//! knows them, and, in QEMU and on the host, the drivers and the logic. What only a board can show,
-//! and no test here does: timing on the bus, the ADC's trigger, the break input, the watchdog,
-//! the flash.
+//! The rest of what a schematic needs is in docs/hardware.md, which `tests/tests/hardware.rs` holds to this
+//! table: what bounds the current and what switches off, clocks, interrupts, memory, parts, and what only a
+//! board can show.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
