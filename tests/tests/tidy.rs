@@ -245,33 +245,57 @@ fn nothing_is_left_for_later() {
     expect_none(&found);
 }
 
+/// The keyword, written apart, or this file would find itself.
+const KEYWORD: &str = concat!("un", "safe");
+
+/// Returns the lines, from 0, that hold the keyword, and whether each says why that is sound.
+fn unsafe_lines(text: &str) -> Vec<(usize, bool)> {
+    let lines: Vec<_> = text.lines().map(str::trim).collect();
+    let places = (0..lines.len()).filter(|place| has_keyword(lines[*place]));
+    places
+        .map(|place| (place, is_explained(&lines[..place], lines[place])))
+        .collect()
+}
+
+/// Tells whether a line's code has the keyword: of a block, function, implementation or attribute.
+fn has_keyword(line: &str) -> bool {
+    let mut code = line.split("//").next().unwrap_or_default().to_owned();
+    let pieces: Vec<_> = code.split('"').collect();
+    // An even number of quotation marks: whole texts, which are no code.
+    if pieces.len() % 2 == 1 {
+        code = pieces.iter().step_by(2).copied().collect();
+    }
+    code.split(|letter: char| !letter.is_alphanumeric() && letter != '_')
+        .any(|word| word == KEYWORD)
+}
+
+/// Tells whether right above a line, but for attributes, is a comment that begins with `SAFETY: `, or
+/// for a function documentation with a section `# Safety`.
+fn is_explained(above: &[&str], line: &str) -> bool {
+    let comment = above
+        .iter()
+        .rev()
+        .skip_while(|line| line.starts_with("#[") && line.ends_with(']'))
+        .take_while(|line| line.starts_with("//"));
+    let is_function = line.contains(&format!("{KEYWORD} fn"));
+    comment.into_iter().any(|line| {
+        let reason = line.strip_prefix("// SAFETY: ");
+        reason.is_some_and(|reason| !reason.is_empty()) || (is_function && *line == "/// # Safety")
+    })
+}
+
 #[test]
 fn unsafe_is_rare_explained_and_only_in_boards() {
-    let places = [
-        concat!("unsafe", " {"),
-        concat!("unsafe", " impl"),
-        concat!("unsafe", " fn"),
-    ];
     let mut found = Vec::new();
     let mut count = 0;
     for (path, text) in sources() {
-        let lines: Vec<_> = text.lines().collect();
-        for (number, line) in lines.iter().enumerate() {
-            let code = line.split("//").next().unwrap_or_default();
-            if !places.iter().any(|place| code.contains(place)) {
-                continue;
-            }
-            if path == INSTRUCTIONS {
-                continue;
-            }
-            if !path.starts_with("firmware/board-") {
-                found.push(format!("{path}:{}: unsafe outside the boards", number + 1));
-                continue;
-            }
-            count += 1;
-            let near = &lines[number.saturating_sub(3)..(number + 2).min(lines.len())];
-            if !near.iter().any(|line| line.contains("// SAFETY: ")) {
-                found.push(format!("{path}:{}: no SAFETY line", number + 1));
+        for (place, is_explained) in unsafe_lines(&text) {
+            let is_board = path.starts_with("firmware/board-");
+            count += usize::from(is_board);
+            if !is_board && path != INSTRUCTIONS {
+                found.push(format!("{path}:{}: unsafe outside the boards", place + 1));
+            } else if !is_explained {
+                found.push(format!("{path}:{}: no SAFETY line above", place + 1));
             }
         }
     }
@@ -281,6 +305,41 @@ fn unsafe_is_rare_explained_and_only_in_boards() {
         "{count} unsafe places, at most {UNSAFE}"
     );
     println!("{count} unsafe places in the boards");
+}
+
+#[test]
+fn an_unsafe_place_without_a_reason_right_above_is_found() {
+    let explained = |text: &str| -> Vec<bool> {
+        let lines = unsafe_lines(&text.replace("KEYWORD", KEYWORD));
+        lines
+            .iter()
+            .map(|(_, is_explained)| *is_explained)
+            .collect()
+    };
+    for sound in [
+        "// SAFETY: it lives.\nlet a = KEYWORD { b() };",
+        "// SAFETY: it lives,\n// and long.\n#[expect(it)]\nKEYWORD {",
+        "/// Does it.\n///\n/// # Safety\n/// It must live.\n#[inline]\npub KEYWORD fn a() {}",
+        "// SAFETY: any bits are valid.\n#[KEYWORD(link_section = \"a\")]",
+    ] {
+        assert_eq!(explained(sound), [true], "{sound}");
+    }
+    for bare in [
+        "let a = KEYWORD { b() };",
+        "// SAFETY: it lives.\n\nKEYWORD impl Sync for A {}",
+        "// SAFETY: it lives.\nlet a = 1;\nlet b = KEYWORD { c() };",
+        "// SAFETY: \nKEYWORD { c() }",
+        "/// # Safety\n/// It must live.\nlet a = KEYWORD { b() };",
+    ] {
+        assert_eq!(explained(bare), [false], "{bare}");
+    }
+    for none in [
+        "// KEYWORD {",
+        "let a = \"KEYWORD {\";",
+        "#![deny(KEYWORD_code)]",
+    ] {
+        assert!(explained(none).is_empty(), "{none}");
+    }
 }
 
 #[test]

@@ -43,6 +43,7 @@ struct Kept(UnsafeCell<Note>);
 // SAFETY: written with interrupts off just before a reset, read once before they are on.
 unsafe impl Sync for Kept {}
 
+// SAFETY: a static that start-up leaves alone may hold any bits, and any are a valid `Note`.
 #[unsafe(link_section = ".uninit.failure")]
 static KEPT: Kept = Kept(UnsafeCell::new(Note {
     magic: 0,

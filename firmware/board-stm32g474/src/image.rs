@@ -21,18 +21,21 @@ static BUS: InterruptExecutor = InterruptExecutor::new();
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static SLOW: InterruptExecutor = InterruptExecutor::new();
 
+// SAFETY: only the interrupt calls it.
 #[handler]
 unsafe fn UART4() {
     // SAFETY: called from the interrupt that the executor was started on.
     unsafe { BUS.on_interrupt() }
 }
 
+// SAFETY: only the interrupt calls it.
 #[handler]
 unsafe fn UART5() {
     // SAFETY: called from the interrupt that the executor was started on.
     unsafe { CONTROL.on_interrupt() }
 }
 
+// SAFETY: only the interrupt calls it.
 #[handler]
 unsafe fn LPUART1() {
     // SAFETY: called from the interrupt that the executor was started on.
