@@ -247,11 +247,10 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
             Step::Start(start) => {
                 let settings = Settings::prototype(start.node, start.serial);
                 let (stored, now) = (store.load(), start.now);
-                vertebra = Some(if start.failed {
-                    Vertebra::after_failure(settings, &stored, &kept, now)
-                } else {
-                    Vertebra::with_stored(settings, &stored, now)
-                });
+                let made = vertebra.insert(Vertebra::with_stored(settings, &stored, now));
+                if start.failed {
+                    made.stop_after_failure(&kept);
+                }
             }
             Step::Turn(input) => {
                 let vertebra = vertebra.as_mut().expect("started");

@@ -69,11 +69,10 @@ fn run() -> Result<(), Failure> {
                 let start = lockstep::Start::decode(body)?;
                 let settings = Settings::prototype(start.node, start.serial);
                 let (stored, now) = (store.load(), start.now);
-                vertebra = Some(if start.failed {
-                    Vertebra::after_failure(settings, &stored, &kept, now)
-                } else {
-                    Vertebra::with_stored(settings, &stored, now)
-                });
+                let made = vertebra.insert(Vertebra::with_stored(settings, &stored, now));
+                if start.failed {
+                    made.stop_after_failure(&kept);
+                }
             }
             (Kind::Input, Some(vertebra)) => {
                 let given = lockstep::Input::decode(body)?;

@@ -22,13 +22,10 @@ mod image {
         };
         let mut store = black_box(Store::new(RamFlash::new()));
         let settings = black_box(Settings::prototype(node, 1));
-        let stored = store.load();
-        let mut vertebra = if black_box(false) {
-            let kept = Keepsake::from_bytes(black_box([0; KEEPSAKE_BYTES]));
-            Vertebra::after_failure(settings, &stored, &kept, now)
-        } else {
-            Vertebra::with_stored(settings, &stored, now)
-        };
+        let mut vertebra = Vertebra::with_stored(settings, &store.load(), now);
+        if black_box(false) {
+            vertebra.stop_after_failure(&Keepsake::from_bytes(black_box([0; KEEPSAKE_BYTES])));
+        }
         let (amplitude, wavelength) = black_box((800, 8_000));
         let Ok(gait) = Gait::new(
             black_box(1_000),

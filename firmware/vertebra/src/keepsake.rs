@@ -1,6 +1,6 @@
 //! What a vertebra remembers over a failure of its microcontroller, in memory that no start clears.
 //!
-//! The platform keeps the newest [`Keepsake`] there and hands it to [`Vertebra::after_failure`]: how
+//! The platform keeps the newest [`Keepsake`] there and hands it to [`Vertebra::stop_after_failure`]: how
 //! warm the windings are, so that a restart cools none of them, and a freeze frame. While a stop or fault
 //! is latched that is its frame; else what the vertebra was doing, at most a tenth of a second before the
 //! failure.

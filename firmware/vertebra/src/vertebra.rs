@@ -109,17 +109,10 @@ impl Vertebra {
         vertebra
     }
 
-    /// Starts a vertebra whose microcontroller ended by a watchdog, a panic or a fault: as at
-    /// power-up, but stopped until a fault reset, and with what was kept of before.
-    pub fn after_failure(
-        settings: Settings,
-        stored: &Stored,
-        kept: &Keepsake,
-        now: Instant,
-    ) -> Self {
-        let mut vertebra = Self::with_stored(settings, stored, now);
-        vertebra.core.restart(kept);
-        vertebra
+    /// Stops a vertebra whose microcontroller ended by a watchdog, a panic or a fault, just after it was
+    /// made, until a fault reset; it remembers what was kept of before.
+    pub fn stop_after_failure(&mut self, kept: &Keepsake) {
+        self.core.restart(kept);
     }
 
     /// Takes a frame from the bus.

@@ -16,8 +16,8 @@ use support::{Bench, node, pose, stays_off};
 fn a_failure_of_its_processor_needs_a_fault_reset() {
     let mut bench = Bench::new();
     let settings = eel_vertebra::Settings::prototype(node(), 7);
-    bench.vertebra =
-        Vertebra::after_failure(settings, &Stored::Nothing, &Keepsake::EMPTY, bench.now());
+    bench.vertebra = Vertebra::new(settings, bench.now());
+    bench.vertebra.stop_after_failure(&Keepsake::EMPTY);
     bench.nmt(NmtCommand::Start);
     bench.run(400);
     assert_eq!(bench.state(), State::StopOff);

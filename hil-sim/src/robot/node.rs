@@ -131,11 +131,10 @@ impl Node for NativeNode {
     }
 
     fn reset(&mut self, now: Instant, cause: Reset) {
-        let stored = self.store.load();
-        self.vertebra = match cause {
-            Reset::Power => Vertebra::with_stored(self.settings, &stored, now),
-            Reset::Failure => Vertebra::after_failure(self.settings, &stored, &self.kept, now),
-        };
+        self.vertebra = Vertebra::with_stored(self.settings, &self.store.load(), now);
+        if cause == Reset::Failure {
+            self.vertebra.stop_after_failure(&self.kept);
+        }
     }
 
     fn vertebra(&self) -> Option<&Vertebra> {
