@@ -59,11 +59,13 @@ pub fn build_command_for(target: &str) -> Result<Command> {
                 "--config",
                 "build.rustc-wrapper=''",
             ]);
-            build.env("RUSTC", DEBIAN_RUSTC).env("RUSTC_BOOTSTRAP", "1");
+            build.env("RUSTC", DEBIAN_RUSTC);
             build.env(format!("CARGO_TARGET_{variable}_LINKER"), linker()?);
             build
         }
     };
+    // For the core library's build and for the sizes of stack frames, see `rust_flags`.
+    build.env("RUSTC_BOOTSTRAP", "1");
     build.args(["--profile", "firmware", "--target", target]);
     // Of their own, or host and cross builds would make each other stale.
     build.arg("--target-dir").arg(cross_dir());
@@ -158,6 +160,8 @@ fn linker() -> Result<PathBuf> {
 ///
 /// LLVM's scheduler is off: it moves multiplications ahead of their use for a processor that would
 /// gain by it, and pays with a spilled register each. The order of the source is the better one.
+///
+/// Each function's stack frame goes into a section that is not loaded, for `cargo xtask stack`.
 fn rust_flags(target: &str) -> String {
     let processor = if target == CORTEX_M3 {
         "cortex-m3"
@@ -167,7 +171,7 @@ fn rust_flags(target: &str) -> String {
     let home = env::var("HOME").unwrap_or_else(|_| "/root".into());
     let cargo = env::var("CARGO_HOME").unwrap_or_else(|_| format!("{home}/.cargo"));
     format!(
-        "-Ctarget-cpu={processor} -Cllvm-args=-enable-misched=false \
+        "-Ctarget-cpu={processor} -Cllvm-args=-enable-misched=false -Zemit-stack-sizes \
          --remap-path-prefix={}=anguilla --remap-path-prefix={cargo}=cargo",
         clean_root().display()
     )

@@ -20,10 +20,11 @@ pub enum Board {
 }
 
 impl Board {
-    const ALL: [Self; 2] = [Self::Stm32g474, Self::Qemu];
+    /// Every board.
+    pub const ALL: [Self; 2] = [Self::Stm32g474, Self::Qemu];
 
     /// Returns the package, which is also the name of its binary.
-    const fn package(self) -> &'static str {
+    pub const fn package(self) -> &'static str {
         match self {
             Self::Stm32g474 => "board-stm32g474",
             Self::Qemu => "board-qemu",

@@ -12,11 +12,13 @@ mod firmware;
 mod fuzz;
 mod generated;
 mod image;
+mod llvm;
 mod node;
 mod panics;
 mod process;
 mod proofs;
 mod setup;
+mod stack;
 mod suite;
 mod vcan;
 
@@ -89,6 +91,8 @@ enum Task {
     Size,
     /// Fails when a panicking symbol is reachable from the logic crates on the target.
     Panics,
+    /// Finds in the code how much stack both images can take, and fails above half of what there is.
+    Stack,
     /// Proves with Gappa that the wrist's kernel never overflows, and how wrong it can be.
     ///
     /// The scripts stay in target/proofs.
@@ -136,6 +140,7 @@ fn main() -> ExitCode {
         Task::Setup => setup::prepare(),
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
+        Task::Stack => stack::check(),
         Task::Exhaustive => exhaustive::check(),
         Task::Proofs => proofs::run(),
         Task::Cycles { json, check, node } => cycles::run(json, check, node),

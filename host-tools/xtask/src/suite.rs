@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, exhaustive, firmware, fuzz, generated, panics, proofs, setup, vcan};
+use crate::{cycles, exhaustive, firmware, fuzz, generated, panics, proofs, setup, stack, vcan};
 
 /// How long each fuzz target looks for new inputs.
 pub const FUZZ_SECONDS: u64 = 60;
@@ -21,7 +21,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 15] = [
+const STEPS: [Step; 16] = [
     Step {
         name: "tools",
         in_fast: false,
@@ -46,6 +46,11 @@ const STEPS: [Step; 15] = [
         name: "no panic in logic",
         in_fast: false,
         run: panics::check,
+    },
+    Step {
+        name: "stack below half",
+        in_fast: false,
+        run: stack::check,
     },
     Step {
         name: "budgets of kernel and node",
