@@ -143,3 +143,16 @@ fn the_workspace_holds_no_singularity() {
         "{least:?}"
     );
 }
+
+#[test]
+fn the_platform_s_angles_are_those_that_its_orientation_was_made_of() {
+    let mut random = Random::new(0x9A9E_4000_0000_0007);
+    for _ in 0..10_000 {
+        let angles = [PI, FRAC_PI_2, PI].map(|limit| 0.999 * limit * random.sign());
+        let [theta3, phi, psi] = angles;
+        let found = design::platform(&design::rotation_from_platform(theta3, phi, psi));
+        for (found, wanted) in found.iter().zip(angles) {
+            assert!((found - wanted).abs() < 1e-9, "{found} instead of {wanted}");
+        }
+    }
+}

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Q30, Random, exact_rotation, pose_of, radians};
 use eel_kinematics::design::Geometry;
-use eel_kinematics::{Nearest, Obstacle, Pose, PoseError, Reach, Wrist};
+use eel_kinematics::{Nearest, Obstacle, Pose, PoseError, Reach, Search, Wrist};
 use eel_units::Angle;
 
 fn angles(pose: &Pose) -> [f64; 3] {
@@ -210,4 +210,62 @@ fn every_input_is_survived() {
         }
     }
     assert!(answers > 1_000, "{answers}");
+}
+
+/// Searches to the end.
+fn finish(search: &mut Search, wrist: &Wrist) -> Pose {
+    let mut pieces = 0;
+    while search.advance(wrist) {
+        pieces += 1;
+        assert!(pieces < 1_000, "a search without an end");
+    }
+    search.best().expect("home is allowed")
+}
+
+#[test]
+fn a_search_that_goes_on_from_a_target_near_by_comes_as_near_as_a_new_one() {
+    let mut random = Random::new(0x4EAC_4000_0000_0003);
+    let (wrist, reach) = (Wrist::PAPER, Reach::kernel());
+    let mut cases = 0;
+    while cases < 300 {
+        let one = [1.4, 0.9, 0.6].map(|limit| limit * random.sign());
+        let other = one.map(|angle| angle + 0.02 * random.sign());
+        let (one, other) = (pose_of(one), pose_of(other));
+        if [one, other]
+            .iter()
+            .any(|it| is_allowed(&wrist, &reach, &angles(it)))
+        {
+            continue;
+        }
+        cases += 1;
+        let mut search = Search::new(&one, &reach);
+        finish(&mut search, &wrist);
+        search.retarget(&other);
+        assert_eq!(search.target(), other);
+        assert!(
+            search.best().is_some(),
+            "what was found stays until there is better"
+        );
+        let again = finish(&mut search, &wrist);
+        assert!(is_allowed(&wrist, &reach, &angles(&again)), "{other:?}");
+        let fresh = finish(&mut Search::new(&other, &reach), &wrist);
+        let far = |pose: &Pose| distance(&angles(pose), &angles(&other));
+        assert!(
+            far(&again) <= far(&fresh) * 1.2 + 1e-2,
+            "{other:?}: {} instead of {}",
+            far(&again),
+            far(&fresh)
+        );
+    }
+}
+
+#[test]
+fn a_search_that_has_found_nothing_yet_starts_anew_for_another_target() {
+    let (wrist, reach) = (Wrist::PAPER, Reach::kernel());
+    let [one, other] = [[1.5, 0.9, 0.0], [-1.5, 0.0, 0.6]].map(pose_of);
+    let mut search = Search::new(&one, &reach);
+    assert_eq!(search.best(), None);
+    search.retarget(&other);
+    let expected = finish(&mut Search::new(&other, &reach), &wrist);
+    assert_eq!(finish(&mut search, &wrist), expected);
 }

@@ -102,3 +102,45 @@ pub const TPDOS: &[PdoDefault] = &[
         mapping: EFFORT,
     },
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mapping_has_the_lengths_of_the_dictionary_in_the_order_asked_for() {
+        let pose = mapped(
+            Pdo::Transmit,
+            [
+                (0x2011, 2),
+                (0x2010, 4),
+                (0x2010, 5),
+                (0x2011, 1),
+                (0x2010, 3),
+            ],
+        );
+        assert_eq!(
+            pose.map(|it| (it.index, it.subindex))[1..3],
+            [(0x2010, 4), (0x2010, 5)]
+        );
+        assert_eq!(pose.map(|it| it.bits), [16, 8, 8, 16, 16]);
+    }
+
+    #[test]
+    #[should_panic(expected = "no such object")]
+    fn what_is_not_in_the_dictionary_is_not_mapped() {
+        mapped(Pdo::Transmit, [(0x2010, 99)]);
+    }
+
+    #[test]
+    #[should_panic(expected = "direction")]
+    fn what_is_received_is_not_mapped_to_be_sent() {
+        mapped(Pdo::Transmit, [(0x2000, 1)]);
+    }
+
+    #[test]
+    #[should_panic(expected = "a frame of this bus is full")]
+    fn a_frame_that_is_not_full_is_not_mapped() {
+        mapped(Pdo::Receive, [(0x2000, 1), (0x2000, 2)]);
+    }
+}

@@ -3,9 +3,9 @@
 use eel_protocol::emergency::Emergency;
 use eel_protocol::{Condition, Mode, State};
 use eel_units::{Angle, Current, Temperature, Voltage};
-use eel_vertebra::Drive;
+use eel_vertebra::{Drive, Settings};
 
-use support::{Bench, stays_off, stopping};
+use support::{Bench, node, stays_off, stopping};
 
 mod support;
 
@@ -209,4 +209,33 @@ fn a_fault_during_a_stop_brakes_the_healthy_motors() {
     bench.sample.bridge_fault[2] = true;
     bench.tick();
     assert_eq!(bench.drives, [Drive::Brake, Drive::Brake, Drive::Off]);
+}
+
+#[test]
+fn a_winding_that_gets_too_hot_is_a_fault_until_it_has_cooled() {
+    for motor in 0..3 {
+        let mut bench = Bench::running();
+        let from = bench.millis;
+        // Less than the current that is a fault at once.
+        bench.sample.current[motor] = Current::from_milliamps(3_600);
+        bench.until(State::Fault, 120_000);
+        let thermal = Settings::prototype(node(), 0).motor.thermal;
+        let limit = thermal.winding_limit.to_decidegrees();
+        let [report] = bench.reports(from)[..] else {
+            panic!("{:?}", bench.reports(from))
+        };
+        assert_eq!(report.code, Emergency::WINDING_OVER_TEMPERATURE.code);
+        assert_eq!(usize::from(report.source.motor), motor + 1);
+        assert!(i32::from(report.source.detail) > limit, "{report:?}");
+        assert!(i32::from(report.source.detail) < limit + 300, "{report:?}");
+
+        bench.sample.current[motor] = Current::ZERO;
+        bench.mode = Mode::FaultReset;
+        // Longer than it brakes.
+        bench.run(2_100);
+        assert_eq!(bench.state(), State::Fault, "still hot");
+        stays_off(&mut bench);
+        bench.run(300_000);
+        bench.recover();
+    }
 }

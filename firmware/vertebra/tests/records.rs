@@ -260,3 +260,11 @@ fn the_data_sheet_is_served_while_the_wrist_runs() {
     assert_eq!(bench.upload(0x1022, 0), Ok(vec![0]));
     assert_eq!(bench.state(), State::Run);
 }
+
+#[test]
+fn the_current_loop_s_time_is_read_as_its_platform_told_it() {
+    let mut bench = Bench::ready();
+    bench.vertebra.note_current_loop(4_321, 9_876);
+    assert_eq!(bench.upload(0x2040, 4).unwrap(), 4_321_u16.to_le_bytes());
+    assert_eq!(bench.upload(0x2040, 5).unwrap(), 9_876_u16.to_le_bytes());
+}

@@ -15,14 +15,17 @@ fn every_entry_is_found_where_it_stands_and_nothing_else_is() {
             match (by_search, find(index, subindex)) {
                 (None, answer) => {
                     assert_eq!(answer, Err(Abort::NoObject));
+                    assert!(lookup(index, subindex).is_none());
                     assert_eq!(served(index, subindex), Err(Abort::NoObject));
                 }
                 (Some(None), answer) => {
                     assert_eq!(answer, Err(Abort::NoSubindex));
+                    assert!(lookup(index, subindex).is_none());
                     assert_eq!(served(index, subindex), Err(Abort::NoSubindex));
                 }
                 (Some(Some(sub)), answer) => {
                     assert_eq!(answer.map(|(_, sub)| sub), Ok(sub));
+                    assert_eq!(lookup(index, subindex), Some(sub));
                     serves_as_the_table_says(sub, served(index, subindex).unwrap());
                     found += 1;
                 }

@@ -1,7 +1,8 @@
 use eel_units::{Angle, Torque};
 
 use super::*;
-use crate::{Counter, Effort, Flags, NodeId, PoseReport, Target};
+use crate::{Counter, Effort, Flags, Moment, NodeId, PoseReport, Target};
+use std::vec::Vec;
 
 fn value(cob: Cob, name: &str, bytes: &[u8]) -> i64 {
     let signals = Message::of(cob).unwrap().signals;
@@ -98,4 +99,37 @@ fn signals_of_a_pose_and_an_effort_are_what_their_types_hold() {
     ]
     .map(|name| value(cob, name, &bytes));
     assert_eq!(flags, [0, 1, 0, 1]);
+}
+
+#[test]
+fn signals_of_a_moment_are_what_its_type_holds() {
+    let moment = Moment {
+        moment: [-32_768, 1, 32_767].map(Torque::from_millinewton_metres),
+        stiffness: 0xABCD,
+    };
+    let cob = Cob::Moment(3);
+    let bytes = moment.to_bytes();
+    let signals = Message::of(cob).unwrap().signals;
+    let values: Vec<_> = signals.iter().map(|signal| signal.raw(&bytes)).collect();
+    assert_eq!(values, [-32_768, 1, 32_767, 0xABCD].map(Some));
+    assert_eq!(Moment::from_bytes(&bytes), moment);
+}
+
+#[test]
+fn an_identifier_has_the_message_that_is_defined_for_it_or_none() {
+    let mut found = 0;
+    for id in 0..0x800 {
+        let cob = Cob::from_id(id);
+        assert_eq!(cob.id(), id);
+        let Some(message) = Message::of(cob) else {
+            continue;
+        };
+        assert_eq!(
+            message.cob_id_base,
+            id - u16::from(cob.node().unwrap_or_default())
+        );
+        found += 1;
+    }
+    // NMT and SYNC have one, the six others one for each of 127 nodes.
+    assert_eq!(found, 2 + 6 * 127);
 }
