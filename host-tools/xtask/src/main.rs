@@ -4,6 +4,7 @@
 //! of its crates but their names.
 
 mod counts;
+mod coverage;
 mod cross;
 mod cycles;
 mod errors;
@@ -93,6 +94,8 @@ enum Task {
     Panics,
     /// Finds in the code how much stack both images can take, and fails above half of what there is.
     Stack,
+    /// Prints which lines of the logic crates their own tests run, and fails below 95 %.
+    Coverage,
     /// Proves with Gappa that the wrist's kernel never overflows, and how wrong it can be.
     ///
     /// The scripts stay in target/proofs.
@@ -141,6 +144,7 @@ fn main() -> ExitCode {
         Task::Size => firmware::print_sizes(),
         Task::Panics => panics::check(),
         Task::Stack => stack::check(),
+        Task::Coverage => coverage::check(),
         Task::Exhaustive => exhaustive::check(),
         Task::Proofs => proofs::run(),
         Task::Cycles { json, check, node } => cycles::run(json, check, node),

@@ -205,7 +205,7 @@ pub fn python() -> PathBuf {
     venv().join("bin/python")
 }
 
-/// Returns the folder of the tests' environment, which has cargo-fuzz too.
+/// Returns the folder of the tests' environment, which has cargo-fuzz and cargo-llvm-cov too.
 pub fn venv() -> PathBuf {
     clean_root().join("target/venv")
 }

@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::process::{cargo, clean_root, output, run, target_dir};
-use crate::{cycles, exhaustive, firmware, fuzz, generated, panics, proofs, setup, stack, vcan};
+use crate::{
+    coverage, cycles, exhaustive, firmware, fuzz, generated, panics, proofs, setup, stack, vcan,
+};
 
 /// How long each fuzz target looks for new inputs.
 pub const FUZZ_SECONDS: u64 = 60;
@@ -21,7 +23,7 @@ struct Step {
     run: fn() -> Result<()>,
 }
 
-const STEPS: [Step; 16] = [
+const STEPS: [Step; 17] = [
     Step {
         name: "tools",
         in_fast: false,
@@ -66,6 +68,11 @@ const STEPS: [Step; 16] = [
         name: "tests",
         in_fast: true,
         run: run_tests,
+    },
+    Step {
+        name: "coverage of logic",
+        in_fast: false,
+        run: coverage::check,
     },
     Step {
         name: "every input of primitives",
