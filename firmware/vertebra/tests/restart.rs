@@ -7,7 +7,6 @@ use eel_kinematics::Pose;
 use eel_protocol::emergency::Emergency;
 use eel_protocol::{Frame, Mode, Moment, State};
 use eel_units::{Angle, Current, Torque};
-use eel_vertebra::store::Stored;
 use eel_vertebra::{Keepsake, Vertebra};
 
 use support::{Bench, node, pose, stays_off};
