@@ -41,7 +41,7 @@ const SECOND_START: usize = 6_800;
 /// Most instructions that half of the turns may take in which the motors are driven.
 const MEDIAN_BUDGET: u64 = 6_000;
 /// Most instructions of one turn of this script: that in which a client asks for everything to be stored.
-const WORST_BUDGET: u64 = 13_000;
+const WORST_BUDGET: u64 = 9_200;
 /// Most instructions of a turn in which the motors are driven.
 const DRIVEN_BUDGET: u64 = 9_000;
 /// Longest time that QEMU may take.
@@ -256,6 +256,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                 let vertebra = vertebra.as_mut().expect("started");
                 let mut output = Output {
                     drives: [Drive::Off; 3],
+                    trim_ns: 0,
                     frames: Default::default(),
                 };
                 let heard = input.frames.iter().copied();
@@ -266,6 +267,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                         .push(frame)
                         .expect("room for what was asked for");
                 });
+                output.trim_ns = vertebra.tick_trim_ns();
                 store::serve(vertebra, &mut store, input.now);
                 kept = vertebra.poll_keepsake().unwrap_or(kept);
                 outputs.push(output);

@@ -4,6 +4,8 @@
 mod client;
 #[path = "system/defects.rs"]
 mod defects;
+#[path = "system/discipline.rs"]
+mod discipline;
 #[path = "system/faults.rs"]
 mod faults;
 #[path = "system/friction.rs"]

@@ -2,7 +2,7 @@
 
 use cortex_m_semihosting::debug;
 use eel_vertebra::lockstep::{self, Frames, HEADER, Header, Kind, MAX_PACKET};
-use eel_vertebra::store::{self, RamFlash, Store};
+use eel_vertebra::store::{RamFlash, Store};
 use eel_vertebra::{Drive, Keepsake, Settings, Vertebra, turn};
 
 use crate::console::{leave, say};
@@ -77,11 +77,28 @@ fn run() -> Result<(), Failure> {
             (Kind::Input, Some(vertebra)) => {
                 let given = lockstep::Input::decode(body)?;
                 let mut frames = Frames::new();
-                let work = || answer(vertebra, &given, &mut frames);
+                let mut asked = None;
+                // All that a board does in its tick, but for its drivers and its flash.
+                let work = || {
+                    let drives = answer(vertebra, &given, &mut frames);
+                    if let Some(record) = vertebra.poll_store() {
+                        asked = Some(record.clone());
+                    }
+                    if let Some(keepsake) = vertebra.poll_keepsake() {
+                        kept = keepsake;
+                    }
+                    drives
+                };
                 let drives = meter.count(work, is_driven);
-                store::serve(vertebra, &mut store, given.now);
-                kept = vertebra.poll_keepsake().unwrap_or(kept);
-                let made = lockstep::Output { drives, frames };
+                if let Some(record) = &asked {
+                    let outcome = store.save(record);
+                    vertebra.finish_store(given.now, outcome);
+                }
+                let made = lockstep::Output {
+                    drives,
+                    trim_ns: vertebra.tick_trim_ns(),
+                    frames,
+                };
                 output.write_all(made.encode().as_bytes())?;
             }
             (Kind::Input, None) | (Kind::Output, _) => return Err(Failure::Order),

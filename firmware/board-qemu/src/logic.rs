@@ -60,7 +60,13 @@ mod image {
         let drives = turn(vertebra, now, heard, &sample, room.into(), |frame| {
             black_box(frames.push(frame).is_ok());
         });
-        black_box(lockstep::Output { drives, frames }.encode().as_bytes());
+        let trim_ns = vertebra.tick_trim_ns();
+        let made = lockstep::Output {
+            drives,
+            trim_ns,
+            frames,
+        };
+        black_box(made.encode().as_bytes());
         black_box((
             vertebra.state(),
             vertebra.status(),

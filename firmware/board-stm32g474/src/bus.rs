@@ -6,11 +6,14 @@
 //! a pause, which grows while it happens again ([`Backoff`]). The first pause is longer than the time
 //! without targets after which the vertebra stops.
 
+use core::cell::Cell;
 use core::num::{NonZeroU8, NonZeroU16};
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use critical_section::Mutex;
 use eel_drivers::Backoff;
-use eel_protocol::Frame;
+use eel_protocol::{Cob, Frame};
+use eel_units::Duration as Span;
 use embassy_futures::select::{Either, select};
 use embassy_stm32::can::config::{GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::filter::{Action, Filter, FilterType, StandardFilter};
@@ -57,6 +60,8 @@ pub static RECEIVED: Channel<CriticalSectionRawMutex, Frame, QUEUE> = Channel::n
 pub static TO_SEND: Channel<CriticalSectionRawMutex, Frame, SENDING> = Channel::new();
 /// How often the bus went off.
 static BUS_OFFS: AtomicU32 = AtomicU32::new(0);
+/// When the newest SYNC came that the control tick has not asked for.
+static SYNC: Mutex<Cell<Option<Instant>>> = Mutex::new(Cell::new(None));
 static RECEIVE_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 static TRANSMIT_OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
@@ -122,6 +127,13 @@ pub fn send(frame: Frame) {
     }
 }
 
+/// Returns how long ago the newest SYNC came, where one has since the last call.
+pub fn sync_age() -> Option<Span> {
+    let at = critical_section::with(|section| SYNC.borrow(section).take());
+    let micros = at?.elapsed().as_micros();
+    Some(Span::from_micros(u32::try_from(micros).unwrap_or(u32::MAX)))
+}
+
 /// Returns how many frames were lost on the way in and on the way out.
 pub fn overruns() -> (u32, u32) {
     let load = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
@@ -134,10 +146,14 @@ pub async fn receive(mut bus: CanRx<'static>) {
     loop {
         match select(bus.read(), Timer::after_millis(PULSE_MS)).await {
             Either::First(Ok(envelope)) => {
-                if let Some(frame) = from_hal(&envelope.frame)
-                    && RECEIVED.try_send(frame).is_err()
-                {
-                    count(&RECEIVE_OVERRUNS);
+                if let Some(frame) = from_hal(&envelope.frame) {
+                    if frame.cob_id() == Some(Cob::Sync.id()) {
+                        let now = Instant::now();
+                        critical_section::with(|section| SYNC.borrow(section).set(Some(now)));
+                    }
+                    if RECEIVED.try_send(frame).is_err() {
+                        count(&RECEIVE_OVERRUNS);
+                    }
                 }
             }
             // The error stays until the bus is well again, and would be read without a pause.

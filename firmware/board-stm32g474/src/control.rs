@@ -7,13 +7,16 @@ use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::store::{StoreError, Stored};
 use eel_vertebra::{Event, Identifiers, Keepsake, Sample, Settings, Vertebra, turn};
 use embassy_stm32::can::Properties;
-use embassy_time::{Duration, Instant, Ticker};
+use embassy_time::{Duration, Instant, Ticker, Timer};
 
 use crate::bridges::{self, Bridges};
 use crate::currents::{self, Currents};
 use crate::failure::Start;
 use crate::sensors::{Counters, CrankConnections, Cranks, temperatures};
 use crate::{bus, failure, liveness, power, storage};
+
+/// Length of a tick that is not trimmed.
+const TICK_NS: u64 = 1_000_000;
 
 /// Everything that the tick measures with and acts on.
 pub struct Hardware {
@@ -73,8 +76,11 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         vertebra.stop_after_failure(&kept);
     }
     let mut heard = Identifiers::new();
+    let mut due_ns = Instant::now().as_micros() * 1_000;
     loop {
-        ticker.next().await;
+        // A millisecond of this clock, trimmed so that the tick keeps its time after SYNC.
+        due_ns = (due_ns + TICK_NS).saturating_add_signed(vertebra.tick_trim_ns().into());
+        Timer::at(Instant::from_micros(due_ns / 1_000)).await;
         let start = Instant::now();
         let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
@@ -132,6 +138,7 @@ fn measure(
         motor_temperature,
         bridge_fault: from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
         over_current: power::tripped(),
+        sync_age: bus::sync_age(),
         emergency_stop: bridges.take_emergency_stop(),
     }
 }
@@ -142,7 +149,7 @@ fn store(vertebra: &mut Vertebra) {
         vertebra.finish_store(now(), outcome);
     }
     if let Some(record) = vertebra.poll_store()
-        && !storage::ask(record)
+        && !storage::ask(record.clone())
     {
         vertebra.finish_store(now(), Err(StoreError::Flash));
     }

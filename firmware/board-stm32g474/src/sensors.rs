@@ -95,7 +95,9 @@ impl CrankConnections {
     pub fn start(self) -> (CrankBus, [Output<'static>; 3]) {
         let mut config = Config::default();
         config.mode = MODE_1;
-        config.frequency = Hertz::mhz(8);
+        // The HAL divides 170 MHz by a power of two, to the nearest: 5.3 MHz. The next, 10.6 MHz, is above
+        // what an AS5047P takes.
+        config.frequency = Hertz::mhz(5);
         let (clock, input, output) = self.lines;
         let spi = Spi::new_blocking(self.spi, clock, output, input, config);
         let select = [

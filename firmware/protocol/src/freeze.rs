@@ -93,27 +93,30 @@ impl TimeOfDay {
 impl FreezeFrame {
     /// Packs the frame.
     pub fn to_bytes(&self) -> [u8; FREEZE_BYTES] {
-        let mut bytes = [0; FREEZE_BYTES];
-        let mut out = Writer { rest: &mut bytes };
         let Source {
             motor,
             limit,
             detail,
         } = self.source;
-        out.put([FREEZE_VERSION, self.state.code(), motor, limit]);
-        out.put(self.code.to_le_bytes());
-        out.put(detail.to_le_bytes());
-        out.put(self.at_us.to_le_bytes());
-        out.put(self.count.to_le_bytes());
         let has_clock = if self.clock.is_some() { HAS_CLOCK } else { 0 };
         let has_reference = match self.reference {
             Some(_) => HAS_REFERENCE,
             None => 0,
         };
-        out.put((has_clock | has_reference).to_le_bytes());
         let clock = self.clock.unwrap_or(TimeOfDay { days: 0, ms: 0 });
-        out.put(clock.days.to_le_bytes());
-        out.put(clock.ms.to_le_bytes());
+        let [a, b, c] = self.torques.map(i16::cast_unsigned);
+        let [one, two, three] = self.limits.map(|limit| u16::from(limit.code()));
+        let [t, u, v, w] = self.temperatures.map(i16::cast_unsigned);
+        let pair = |low: u16, high: u16| u32::from(low) | u32::from(high) << 16;
+        let head = [
+            u32::from_le_bytes([FREEZE_VERSION, self.state.code(), motor, limit]),
+            pair(self.code, detail),
+            self.at_us as u32,
+            (self.at_us >> 32) as u32,
+            self.count,
+            pair(has_clock | has_reference, clock.days),
+            clock.ms,
+        ];
         let triples = [
             self.pose,
             self.reference.unwrap_or_default(),
@@ -121,21 +124,27 @@ impl FreezeFrame {
             self.speeds,
             self.currents,
         ];
-        for value in triples.into_iter().flatten() {
-            out.put(value.to_le_bytes());
-        }
-        for torque in self.torques {
-            out.put(torque.to_le_bytes());
-        }
-        let [one, two, three] = self.limits.map(|limit| u16::from(limit.code()));
-        out.put((one | two << 4 | three << 8).to_le_bytes());
-        out.put(self.supply.to_le_bytes());
-        for temperature in self.temperatures {
-            out.put(temperature.to_le_bytes());
-        }
-        out.put(self.status.to_bits().to_le_bytes());
-        for counter in self.counters {
-            out.put(counter.to_le_bytes());
+        let tail = [
+            pair(a, b),
+            pair(c, one | two << 4 | three << 8),
+            self.supply.cast_unsigned(),
+            pair(t, u),
+            pair(v, w),
+            self.status.to_bits(),
+        ];
+        let mut bytes = [0; FREEZE_BYTES];
+        let triples = triples
+            .as_flattened()
+            .iter()
+            .map(|value| value.cast_unsigned());
+        let words = head
+            .into_iter()
+            .chain(triples)
+            .chain(tail)
+            .chain(self.counters);
+        // As many as there is room for.
+        for (to, word) in bytes.as_chunks_mut().0.iter_mut().zip(words) {
+            *to = word.to_le_bytes();
         }
         bytes
     }
@@ -203,21 +212,6 @@ impl FreezeFrame {
             status,
             counters,
         })
-    }
-}
-
-/// The rest of a frame that is being packed; the tests hold that it is filled exactly.
-struct Writer<'a> {
-    rest: &'a mut [u8],
-}
-
-impl Writer<'_> {
-    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
-        let rest = core::mem::take(&mut self.rest);
-        if let Some((slot, others)) = rest.split_first_chunk_mut() {
-            *slot = bytes;
-            self.rest = others;
-        }
     }
 }
 

@@ -44,7 +44,6 @@ impl Senses {
     }
 
     /// Tells whether something of motor 0–2 is reversed.
-    #[inline]
     pub const fn is_reversed(self, sense: Sense, motor: usize) -> bool {
         self.0 & Self::mask(sense, motor) != 0
     }
@@ -57,6 +56,15 @@ impl Senses {
             Self(self.0 | mask)
         } else {
             Self(self.0 & !mask)
+        }
+    }
+
+    /// Returns −1 where something is reversed, else 1.
+    const fn sign(self, sense: Sense, motor: usize) -> i32 {
+        if self.is_reversed(sense, motor) {
+            -1
+        } else {
+            1
         }
     }
 
@@ -92,51 +100,97 @@ impl Calibration {
             senses: Senses(0),
         }
     }
+}
 
-    /// Returns what is measured in the senses of the cranks.
-    #[inline]
-    pub fn apply(&self, mut sample: Sample) -> Sample {
-        let known = self.zero.into_iter().zip(self.offset).zip(HOME);
-        let counts = sample.encoder_counts.iter_mut();
-        let measured = counts.zip(&mut sample.absolute).zip(&mut sample.current);
-        for (motor, (((count, absolute), current), ((zero, offset), home))) in
-            measured.zip(known).enumerate()
-        {
-            if self.senses.is_reversed(Sense::Counter, motor) {
-                *count = count.wrapping_neg();
-            }
-            if let Some(angle) = absolute {
-                let turned = wrapped(*angle, zero);
-                let turned = if self.senses.is_reversed(Sense::Crank, motor) {
-                    -turned
-                } else {
-                    turned
-                };
-                *angle = home + turned;
-            }
-            *current -= offset;
-            if self.senses.is_reversed(Sense::Leads, motor) {
-                *current = -*current;
-            }
+/// A calibration made ready for the control tick: signs of ±1 instead of bits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Correction {
+    motors: [Signs; 3],
+}
+
+/// What of one motor is reversed and off.
+#[derive(Clone, Copy, Debug)]
+struct Signs {
+    counter: i32,
+    crank: i32,
+    leads: i32,
+    zero: Angle,
+    /// What is beyond these has turned on past half a turn from zero.
+    low: Angle,
+    high: Angle,
+    home: Angle,
+    offset: Current,
+}
+
+impl Correction {
+    /// Makes it ready.
+    pub const fn new(calibration: &Calibration) -> Self {
+        let senses = calibration.senses;
+        let [one, two, three] = calibration.zero;
+        let [a, b, c] = calibration.offset;
+        let [x, y, z] = HOME;
+        Self {
+            motors: [
+                Signs::new(senses, 0, (one, x, a)),
+                Signs::new(senses, 1, (two, y, b)),
+                Signs::new(senses, 2, (three, z, c)),
+            ],
         }
-        sample
     }
 
-    /// Returns what the bridges are told so that the motors do what is meant.
+    /// Makes what is measured what it is in the senses of the cranks.
     #[inline]
-    pub fn drives(&self, mut drives: [Drive; 3]) -> [Drive; 3] {
-        for (motor, (drive, offset)) in drives.iter_mut().zip(self.offset).enumerate() {
-            if let Drive::Current(setpoint) = drive {
-                if self.senses.is_reversed(Sense::Leads, motor) {
-                    *setpoint = Setpoint {
-                        current: -setpoint.current,
-                        emf: Voltage::from_millivolts(-setpoint.emf.to_millivolts()),
-                    };
-                }
-                setpoint.current += offset;
+    pub fn apply(&self, sample: &mut Sample) {
+        let counts = sample.encoder_counts.iter_mut();
+        let measured = counts.zip(&mut sample.absolute).zip(&mut sample.current);
+        for (((count, absolute), current), signs) in measured.zip(&self.motors) {
+            *count = count.wrapping_mul(signs.counter);
+            if let Some(angle) = absolute {
+                // As wrapped() does, in 32 bits, where the sum may leave them and come back.
+                let turn = if *angle > signs.high {
+                    -TURN
+                } else if *angle < signs.low {
+                    TURN
+                } else {
+                    0
+                };
+                let turned = angle
+                    .to_q29()
+                    .wrapping_sub(signs.zero.to_q29())
+                    .wrapping_add(turn as i32);
+                *angle = signs.home + Angle::from_q29(turned.wrapping_mul(signs.crank));
+            }
+            let through = (*current - signs.offset).to_microamps();
+            *current = Current::from_microamps(through.wrapping_mul(signs.leads));
+        }
+    }
+
+    /// Makes what the motors are to do what the bridges are told.
+    #[inline]
+    pub fn turn(&self, drives: &mut [Drive; 3]) {
+        for (drive, signs) in drives.iter_mut().zip(&self.motors) {
+            if let Drive::Current(Setpoint { current, emf }) = drive {
+                let wanted = current.to_microamps().wrapping_mul(signs.leads);
+                *current = Current::from_microamps(wanted) + signs.offset;
+                *emf = Voltage::from_millivolts(emf.to_millivolts().wrapping_mul(signs.leads));
             }
         }
-        drives
+    }
+}
+
+impl Signs {
+    const fn new(senses: Senses, motor: usize, known: (Angle, Angle, Current)) -> Self {
+        let (zero, home, offset) = known;
+        Self {
+            counter: senses.sign(Sense::Counter, motor),
+            crank: senses.sign(Sense::Crank, motor),
+            leads: senses.sign(Sense::Leads, motor),
+            zero,
+            low: Angle::from_q29(eel_units::saturate(zero.to_q29() as i64 - TURN / 2)),
+            high: Angle::from_q29(eel_units::saturate(zero.to_q29() as i64 + TURN / 2)),
+            home,
+            offset,
+        }
     }
 }
 
@@ -187,8 +241,8 @@ mod tests {
                 turned
             };
             let read = i64::from(self.zero.to_q29()) + i64::from(crank.to_q29());
-            let read =
-                Angle::from_q29((read + TURN / 2).rem_euclid(TURN) as i32 - (TURN / 2) as i32);
+            let read = (read + TURN / 2).rem_euclid(TURN) - TURN / 2;
+            let read = Angle::from_q29(read as i32);
             let current = if self.sign(Sense::Leads) < 0 {
                 -current
             } else {
@@ -212,6 +266,7 @@ mod tests {
             motor_temperature: Default::default(),
             bridge_fault: [false; 3],
             over_current: [false; 3],
+            sync_age: None,
             emergency_stop: false,
         }
     }
@@ -239,7 +294,9 @@ mod tests {
                 let (turned, current) =
                     (Angle::from_milliradians(400), Current::from_milliamps(900));
                 let (count, absolute, measured) = built.read(turned, 5_600, current);
-                let seen = calibration.apply(sample(count, absolute, measured));
+                let correction = Correction::new(&calibration);
+                let mut seen = sample(count, absolute, measured);
+                correction.apply(&mut seen);
                 assert_eq!(seen.encoder_counts, [0, 5_600, 0]);
                 assert_eq!(seen.current[1], current);
                 let error = seen.absolute[1].unwrap() - (HOME[1] + turned);
@@ -249,8 +306,9 @@ mod tests {
                 );
                 // What the bridge holds at the sensor is the current that was meant.
                 let emf = Voltage::from_millivolts(700);
-                let [_, told, _] =
-                    calibration.drives([Drive::Current(Setpoint { current, emf }); 3]);
+                let mut drives = [Drive::Current(Setpoint { current, emf }); 3];
+                correction.turn(&mut drives);
+                let [_, told, _] = drives;
                 let Drive::Current(told) = told else {
                     panic!("{told:?}");
                 };
@@ -270,14 +328,18 @@ mod tests {
             Angle::from_milliradians(-900),
             Current::from_milliamps(3),
         );
-        let ideal = Calibration::ideal(9);
-        assert_eq!(ideal.apply(seen), seen);
+        let ideal = Correction::new(&Calibration::ideal(9));
+        let mut corrected = seen;
+        ideal.apply(&mut corrected);
+        assert_eq!(corrected, seen);
         let drives = [
             Drive::Off,
             Drive::Brake,
             Drive::Current(Setpoint::default()),
         ];
-        assert_eq!(ideal.drives(drives), drives);
+        let mut turned = drives;
+        ideal.turn(&mut turned);
+        assert_eq!(turned, drives);
     }
 
     #[test]
@@ -285,9 +347,9 @@ mod tests {
         let mut calibration = Calibration::NONE;
         calibration.senses = calibration.senses.with(Sense::Counter, 1, true);
         let count = |raw| {
-            calibration
-                .apply(sample(raw, Angle::ZERO, Current::ZERO))
-                .encoder_counts[1]
+            let mut seen = sample(raw, Angle::ZERO, Current::ZERO);
+            Correction::new(&calibration).apply(&mut seen);
+            seen.encoder_counts[1]
         };
         assert_eq!(count(i32::MIN).wrapping_sub(count(i32::MAX)), -1);
     }

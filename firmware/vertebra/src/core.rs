@@ -7,8 +7,10 @@ use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
 use eel_units::{Angle, AngularVelocity, Current, Instant, Torque, saturate};
 
+use crate::calibration::Correction;
 use crate::command::{CommandStream, TARGET_TIMEOUT};
 use crate::current::Electrical;
+use crate::discipline::Discipline;
 use crate::encoder::{Encoder, EncoderFault};
 use crate::events::{EVENTS, Event};
 use crate::freezing::Clock;
@@ -40,6 +42,7 @@ pub(crate) struct Core {
     pub impedance: Impedance,
     pub electrical: Electrical,
     pub friction: Compensation,
+    pub correction: Correction,
     /// What it takes of each motor now.
     pub friction_torques: [Torque; 3],
     /// Where the reference had the motors, and when.
@@ -75,6 +78,8 @@ pub(crate) struct Core {
     pub guide: Guide,
     /// Whether a pose was admitted since the last tick, or in this one.
     pub has_followed: bool,
+    /// Whether the last tick was long because of one.
+    pub was_long: bool,
     pub warned: bool,
     pub lost_ticks: u8,
     pub feed_since: Instant,
@@ -84,13 +89,17 @@ pub(crate) struct Core {
     pub reference: Option<Reference>,
     pub pose_counter: Counter,
     pub pose_bytes: [u8; 8],
-    pub sample: Option<Sample>,
+    /// What was measured for this tick, in the senses of the cranks; nothing before the first.
+    pub sample: Sample,
     pub counters: Counters,
     pub timing: Timing,
+    pub discipline: Discipline,
     pub pending: Pending,
     pub events: EventQueue<Event, EVENTS>,
     /// What was kept of the last fault or stop; outlives a reset of the node.
     pub freeze: Option<FreezeFrame>,
+    /// What is to be remembered over a failure; made in one tick and packed in the next.
+    pub snapshot: Option<FreezeFrame>,
     /// Whether there was one since the scope looked last.
     pub raised: bool,
     /// The time of day, once TIME came; outlives a reset of the node.
@@ -99,6 +108,10 @@ pub(crate) struct Core {
     pub procedure: Procedure,
     /// What each current sensor reads while the bridges are off, low-passed, in 1/64 µA.
     pub idle: [i64; 3],
+    /// Whether the settings contradict neither themselves nor physics.
+    pub is_sound: bool,
+    /// Whether the calibration is this unit's.
+    pub is_calibrated: bool,
     /// Whether settings were stored and are lost, so that these are not the ones meant.
     pub settings_lost: bool,
 }
@@ -112,6 +125,7 @@ impl Core {
             impedance: Impedance::new(&settings.gains),
             electrical: Electrical::new(&settings.motor),
             friction: Compensation::new(&settings.motor.friction),
+            correction: Correction::new(&settings.calibration),
             friction_torques: [Torque::ZERO; 3],
             led: None,
             thermal: [Thermal::new(); 3],
@@ -137,6 +151,7 @@ impl Core {
             limited: Limited::default(),
             guide: Guide::default(),
             has_followed: false,
+            was_long: false,
             warned: false,
             lost_ticks: 0,
             feed_since: now,
@@ -150,16 +165,20 @@ impl Core {
             reference: None,
             pose_counter: Counter::default(),
             pose_bytes: [0; 8],
-            sample: None,
+            sample: Sample::default(),
             counters: Counters::default(),
             timing: Timing::default(),
+            discipline: Discipline::default(),
             pending: Pending::default(),
             events: EventQueue::default(),
             freeze: None,
+            snapshot: None,
             raised: false,
             clock: None,
             procedure: Procedure::default(),
             idle: [0; 3],
+            is_sound: settings.are_sound(),
+            is_calibrated: settings.calibration.serial == settings.serial,
             settings_lost: false,
             settings,
         }
@@ -175,21 +194,25 @@ impl Core {
     pub fn prepare(&mut self) {
         self.impedance = Impedance::new(&self.settings.gains);
         self.friction = Compensation::new(&self.settings.motor.friction);
+        self.correction = Correction::new(&self.settings.calibration);
+        self.is_sound = self.settings.are_sound();
+        self.is_calibrated = self.settings.calibration.serial == self.settings.serial;
     }
 
     /// Does one control tick, with what the sensors read and the bridges are told in their own senses.
     pub fn tick(&mut self, now: Instant, raw: &Sample) -> [Drive; 3] {
         self.now = now;
-        let sample = &self.settings.calibration.apply(*raw);
-        self.sample = Some(*sample);
-        let motors = self.thermal.iter_mut().zip(sample.current);
+        self.discipline.tick(raw.sync_age);
+        self.sample = *raw;
+        self.correction.apply(&mut self.sample);
+        let motors = self.thermal.iter_mut().zip(self.sample.current);
         for ((thermal, current), is_open) in motors.zip(self.is_open) {
             // What the sensor of an open bridge reads is no current.
             thermal.take(if is_open { Current::ZERO } else { current });
         }
-        self.take_turn(sample);
-        let motion = self.estimate(sample);
-        self.watch(sample);
+        self.take_turn();
+        let motion = self.estimate();
+        self.watch();
         self.bridge_missing_targets();
         self.search_on();
         if now.since(self.feed_since) >= TARGET_TIMEOUT {
@@ -200,28 +223,32 @@ impl Core {
         self.machine
             .advance(now, aligned, self.status.refusals().is_empty());
         self.note_state(before);
-        let drives = match self.proceed(raw) {
-            Some(drives) => drives,
-            None => {
-                let drives = self.drive(motion.as_ref(), sample);
-                self.settings.calibration.drives(drives)
-            }
-        };
-        self.is_open = drives.map(|drive| drive == Drive::Off);
+        let mut drives = self.drive(motion.as_ref());
+        self.correction.turn(&mut drives);
+        if self.procedure.is_running() {
+            self.proceed(raw, &mut drives);
+        }
+        self.is_open = drives.map(|drive| matches!(drive, Drive::Off));
         self.forget_warnings();
         self.report();
         self.end_warnings();
+        self.was_long = self.has_followed;
         self.has_followed = false;
         drives
     }
 
     /// Turns readings into angles, speeds and the pose, and returns what the wrist does.
-    fn estimate(&mut self, sample: &Sample) -> Option<Motion> {
+    fn estimate(&mut self) -> Option<Motion> {
         if self.is_being_calibrated() {
             // What counts and angles mean is not known.
             self.encoders = [Encoder::new(&self.settings.motor); 3];
         }
-        let readings = sample.encoder_counts.into_iter().zip(sample.absolute);
+        let Sample {
+            encoder_counts,
+            absolute,
+            ..
+        } = self.sample;
+        let readings = encoder_counts.into_iter().zip(absolute);
         for (motor, (encoder, (count, absolute))) in
             self.encoders.iter_mut().zip(readings).enumerate()
         {
@@ -322,7 +349,7 @@ impl Core {
     }
 
     /// Returns what the bridges do until the next tick.
-    fn drive(&mut self, motion: Option<&Motion>, sample: &Sample) -> [Drive; 3] {
+    fn drive(&mut self, motion: Option<&Motion>) -> [Drive; 3] {
         self.reference = None;
         self.achieved = [Torque::ZERO; 3];
         self.unallocated = [Torque::ZERO; 3];
@@ -353,10 +380,10 @@ impl Core {
             }
             State::Hold => self.pull(motion, Reference::at_rest(self.hold)),
             State::Moment => self.push(motion),
-            State::Motor => return self.drive_motors(motion, cap, sample),
+            State::Motor => return self.drive_motors(motion, cap),
             _ => self.impedance.damping(motion),
         };
-        let bounds = self.bounds(cap, sample);
+        let bounds = self.bounds(cap);
         self.share(motion, moment, &bounds)
     }
 
@@ -420,9 +447,9 @@ impl Core {
     }
 
     /// Returns what each motor may produce.
-    pub fn bounds(&self, command_cap: Option<Torque>, sample: &Sample) -> [MotorBounds; 3] {
+    pub fn bounds(&self, command_cap: Option<Torque>) -> [MotorBounds; 3] {
         let situation = Situation {
-            sample,
+            sample: &self.sample,
             standing: &self.standing,
             angles: self.angles(),
             speeds: self.speeds(),
@@ -462,11 +489,10 @@ impl Core {
     fn report(&mut self) {
         let moment_limited = self.unallocated.iter().any(|axis| *axis != Torque::ZERO);
         self.status = self.status.with(Condition::MomentLimited, moment_limited);
-        if let Some(sample) = &self.sample {
-            self.effort.torque = sample
-                .current
-                .map(|current| self.electrical.torque(current));
-        }
+        self.effort.torque = self
+            .sample
+            .current
+            .map(|current| self.electrical.torque(current));
         let holds = |condition| self.status.contains(condition);
         self.effort.flags = Flags {
             target_limited: holds(Condition::TargetLimited),

@@ -56,7 +56,7 @@ struct Observer {
     /// Q29 rad with 8 bits more.
     position: i64,
     /// Q24 rad/s.
-    speed: i64,
+    speed: i32,
 }
 
 impl Encoder {
@@ -151,7 +151,7 @@ impl Encoder {
 
     /// Returns the crank's speed, low-passed at 600 rad/s.
     pub fn speed(&self) -> AngularVelocity {
-        AngularVelocity::from_q24(saturate(self.observer.speed))
+        AngularVelocity::from_q24(self.observer.speed)
     }
 
     /// Averages the absolute angle at no motion; any doubt starts the average again.
@@ -210,12 +210,15 @@ impl Encoder {
 impl Observer {
     /// Advances by one tick towards the measured `angle`, Q29.
     fn follow(&mut self, angle: i64) {
-        let predicted = self.position.saturating_add((self.speed * TICK) >> 8);
+        let predicted = self
+            .position
+            .saturating_add((i64::from(self.speed) * TICK) >> 8);
         let error = (angle << 8).saturating_sub(predicted).clamp(-FAR, FAR);
         self.position = predicted.saturating_add((error * POSITION_GAIN) >> 16);
         // Q37 rad × 1/s is Q37 rad/s; the speed is Q24.
         let change = (error * SPEED_GAIN) >> 13;
-        self.speed = i64::from(saturate(self.speed.saturating_add(change)));
+        // The change is below 2⁴².
+        self.speed = saturate(i64::from(self.speed) + change);
     }
 }
 

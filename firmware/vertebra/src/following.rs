@@ -32,7 +32,6 @@ impl Core {
 
     /// Takes a SYNC; targets have been received just before.
     pub fn synchronise(&mut self, now: Instant) {
-        self.timing.note_sync(now);
         self.feed_forward = self.received_feed;
         if !self.stream.is_fresh() {
             self.mend_path();

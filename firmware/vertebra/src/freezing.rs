@@ -33,7 +33,10 @@ impl Core {
             time.later(now.saturating_sub(told.to_micros()))
         });
         let triple = |pose: eel_kinematics::Pose| [pose.yaw, pose.pitch, pose.roll].map(micro);
-        let mut frame = FreezeFrame {
+        let sample = &self.sample;
+        let tenths = |value: Temperature| value.to_decidegrees() as i16;
+        let [one, two, three] = sample.motor_temperature.map(tenths);
+        FreezeFrame {
             state: before,
             code: emergency.code,
             source,
@@ -47,11 +50,13 @@ impl Core {
                 .encoders
                 .each_ref()
                 .map(|encoder| milli(encoder.speed())),
-            currents: [0; 3],
-            torques: [0; 3],
+            currents: sample.current.map(|current| current.to_microamps() / 1_000),
+            torques: sample
+                .current
+                .map(|current| self.electrical.torque(current).to_millinewton_metres()),
             limits: self.effort.limit,
-            supply: 0,
-            temperatures: [0; 4],
+            supply: sample.supply.to_millivolts(),
+            temperatures: [tenths(sample.board_temperature), one, two, three],
             status: self.status,
             counters: [
                 self.stream.counters().bad,
@@ -59,18 +64,7 @@ impl Core {
                 self.counters.receive_overruns,
                 self.counters.transmit_overruns,
             ],
-        };
-        if let Some(sample) = &self.sample {
-            let tenths = |value: Temperature| value.to_decidegrees() as i16;
-            let [one, two, three] = sample.motor_temperature.map(tenths);
-            frame.temperatures = [tenths(sample.board_temperature), one, two, three];
-            frame.supply = sample.supply.to_millivolts();
-            frame.currents = sample.current.map(|current| current.to_microamps() / 1_000);
-            frame.torques = sample
-                .current
-                .map(|current| self.electrical.torque(current).to_millinewton_metres());
         }
-        frame
     }
 }
 

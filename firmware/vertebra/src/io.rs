@@ -1,10 +1,10 @@
 //! What a vertebra measures and what it does to its motors.
 
-use eel_units::{Angle, Current, Temperature, Voltage};
+use eel_units::{Angle, Current, Duration, Temperature, Voltage};
 
 /// Everything measured for one control tick; motors in the order 1, 2, 3. A platform gives what the
 /// sensors read, in their own senses; the vertebra's calibration makes it what is said here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// Quadrature counts of each motor since power-up, positive with the motor's angle; wraps.
     pub encoder_counts: [i32; 3],
@@ -22,6 +22,9 @@ pub struct Sample {
     pub bridge_fault: [bool; 3],
     /// Whether the current loop has switched a bridge off, [`CurrentLoop::tripped`](crate::CurrentLoop::tripped).
     pub over_current: [bool; 3],
+    /// How long before this tick the newest SYNC arrived, where one has since the tick before and the
+    /// platform can tell.
+    pub sync_age: Option<Duration>,
     /// Whether the emergency stop line is asserted.
     pub emergency_stop: bool,
 }

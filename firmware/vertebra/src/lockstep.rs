@@ -7,7 +7,7 @@
 
 use eel_canopen::{Frame, Id};
 use eel_protocol::NodeId;
-use eel_units::{Angle, Current, Instant, Temperature, Voltage};
+use eel_units::{Angle, Current, Duration, Instant, Temperature, Voltage};
 use embedded_can::{ExtendedId, StandardId};
 use heapless::Vec;
 
@@ -23,11 +23,13 @@ pub const HEADER: usize = 4;
 pub const MAX_PACKET: usize = HEADER + TIME + SAMPLE + 1 + 1 + MAX_FRAMES * FRAME;
 
 const TIME: usize = 8;
-const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1;
+const SAMPLE: usize = 4 * 3 + 1 + 4 * 3 + 4 * 3 + 4 + 4 + 4 * 3 + 1 + 4;
+/// Stands for no SYNC.
+const NO_SYNC: u32 = u32::MAX;
 const FRAME: usize = 4 + 1 + 8;
 const DRIVES: usize = 3 * (1 + 4 + 4);
 
-const _: () = assert!(DRIVES + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
+const _: () = assert!(DRIVES + 4 + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
 
 const EXTENDED: u32 = 1 << 31;
@@ -100,6 +102,8 @@ pub struct Input {
 pub struct Output {
     /// What the bridges do.
     pub drives: [Drive; 3],
+    /// By how much its next tick shall be longer than a millisecond, ns.
+    pub trim_ns: i32,
     /// What it sends, in this order.
     pub frames: Frames,
 }
@@ -269,6 +273,7 @@ impl Output {
             packet.put_i32(setpoint.current.to_microamps());
             packet.put_i32(setpoint.emf.to_millivolts());
         }
+        packet.put_i32(self.trim_ns);
         packet.put_frames(&self.frames);
         packet.finish()
     }
@@ -291,9 +296,14 @@ impl Output {
                 _ => return Err(PacketError::Value),
             };
         }
+        let trim_ns = reader.take_i32()?;
         let frames = reader.take_frames()?;
         reader.finish()?;
-        Ok(Self { drives, frames })
+        Ok(Self {
+            drives,
+            trim_ns,
+            frames,
+        })
     }
 }
 
@@ -317,6 +327,8 @@ fn put_sample(packet: &mut Packet, sample: &Sample) {
     }
     let stop = u8::from(sample.emergency_stop) << 3;
     packet.put(&[to_bits(sample.bridge_fault) | stop | to_bits(sample.over_current) << 4]);
+    let age = sample.sync_age.map_or(NO_SYNC, Duration::to_micros);
+    packet.put(&age.to_le_bytes());
 }
 
 fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
@@ -336,6 +348,7 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
     let board_temperature = Temperature::from_decidegrees(reader.take_i32()?);
     let motor_temperature = reader.take_three()?.map(Temperature::from_decidegrees);
     let flags = reader.take_u8()?;
+    let age = u32::from_le_bytes(reader.take()?);
     Ok(Sample {
         encoder_counts,
         absolute,
@@ -345,6 +358,7 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
         motor_temperature,
         bridge_fault: from_bits(flags & 0x07)?,
         over_current: from_bits(flags >> 4)?,
+        sync_age: (age != NO_SYNC).then(|| Duration::from_micros(age)),
         emergency_stop: flags & 1 << 3 != 0,
     })
 }

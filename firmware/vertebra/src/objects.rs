@@ -3,7 +3,7 @@
 use eel_canopen::Abort;
 use eel_protocol::State;
 use eel_protocol::dictionary::Field;
-use eel_units::{Angle, Duration, Instant, Temperature, Torque};
+use eel_units::{Angle, Duration, Temperature, Torque};
 
 use crate::core::Core;
 use crate::encoder::Encoder;
@@ -31,16 +31,13 @@ pub(crate) struct Counters {
     pub transmit_overruns: u32,
 }
 
-/// How long a turn takes and how SYNC lies, object 0x2040.
+/// How long a turn takes, object 0x2040.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Timing {
     loop_last: Duration,
     loop_max: Duration,
     /// Last and longest turn of the current loop, ns.
     pub current_loop_ns: (u32, u32),
-    last_sync: Option<Instant>,
-    sync_period_us: i64,
-    sync_phase_us: i64,
 }
 
 impl ReceivedTarget {
@@ -71,20 +68,6 @@ impl Timing {
     pub fn note_loop(&mut self, duration: Duration) {
         self.loop_last = duration;
         self.loop_max = self.loop_max.max(duration);
-    }
-
-    /// Takes the arrival of a SYNC and compares it with where the ones before lead it to be
-    /// expected.
-    pub fn note_sync(&mut self, now: Instant) {
-        if let Some(last) = self.last_sync {
-            let period = i64::from(now.since(last).to_micros());
-            if self.sync_period_us == 0 || period > 2 * self.sync_period_us {
-                self.sync_period_us = period;
-            }
-            self.sync_phase_us = period - self.sync_period_us;
-            self.sync_period_us += self.sync_phase_us / 8;
-        }
-        self.last_sync = Some(now);
     }
 }
 
@@ -167,7 +150,9 @@ impl Core {
             Field::WindingTemperature3 => i64::from(tenths(self.thermal[2].winding())),
             Field::LoopLast => i64::from(self.timing.loop_last.to_micros()),
             Field::LoopMax => i64::from(self.timing.loop_max.to_micros()),
-            Field::SyncPhase => self.timing.sync_phase_us,
+            Field::SyncPhase => i64::from(self.discipline.error_us),
+            Field::TickTrim => i64::from(self.discipline.trim_ns()),
+            Field::TickLocked => i64::from(self.discipline.is_locked()),
             Field::CurrentLoopLast => i64::from(self.timing.current_loop_ns.0),
             Field::CurrentLoopMax => i64::from(self.timing.current_loop_ns.1),
             Field::ProcedureStep => 0,
@@ -193,11 +178,9 @@ impl Core {
         }
     }
 
-    /// Returns a number of the last sample; nothing before the first.
+    /// Returns a number of the last sample; 0 before the first.
     fn measured(&self, pick: impl Fn(&Sample) -> i32) -> i64 {
-        self.sample
-            .as_ref()
-            .map_or(0, |sample| i64::from(pick(sample)))
+        i64::from(pick(&self.sample))
     }
 
     fn pose_word(&self, at: usize) -> i64 {

@@ -102,6 +102,12 @@ enum Outcome {
 const OFF: Outcome = Outcome::Goes([Drive::Off; 3]);
 
 impl Procedure {
+    /// Tells whether a step goes on.
+    #[inline]
+    pub const fn is_running(&self) -> bool {
+        self.step.is_some()
+    }
+
     /// Returns what hands have to do before it can go on.
     pub fn waits_for(&self) -> Option<Hands> {
         match (self.step, self.part) {
@@ -142,7 +148,7 @@ impl Procedure {
 impl Core {
     /// Tells whether the encoders' zeros and senses are not known, or about to be found.
     pub fn is_being_calibrated(&self) -> bool {
-        self.settings.calibration.serial != self.settings.serial
+        !self.is_calibrated
             || matches!(
                 self.procedure.step,
                 Some(Step::Home | Step::Senses | Step::Leads)
@@ -176,16 +182,20 @@ impl Core {
         Ok(())
     }
 
-    /// Goes on with the step that was ordered; returns what the bridges do where that is the step's to
+    /// Goes on with the step that was ordered, and says what the bridges do where that is the step's to
     /// say, in the senses of the bridges themselves.
-    pub fn proceed(&mut self, raw: &Sample) -> Option<[Drive; 3]> {
-        let step = self.procedure.step?;
+    #[cold]
+    #[inline(never)]
+    pub fn proceed(&mut self, raw: &Sample, drives: &mut [Drive; 3]) {
+        let Some(step) = self.procedure.step else {
+            return;
+        };
         let is_testing = self.machine.state() == State::Test;
         let is_powered = matches!(step, Step::Leads | Step::Test);
         let is_disturbed = self.operational || self.machine.state().is_latched();
         if is_disturbed || is_powered != is_testing {
             self.end_procedure(Progress::Failed, Reason::Stopped, None);
-            return None;
+            return;
         }
         self.procedure.ticks += 1;
         let outcome = match step {
@@ -196,14 +206,11 @@ impl Core {
             Step::Test => self.test_itself(raw),
         };
         match outcome {
-            Outcome::Goes(drives) => is_testing.then_some(drives),
-            Outcome::Done => {
-                self.finish(step);
-                None
-            }
+            Outcome::Goes(wanted) if is_testing => *drives = wanted,
+            Outcome::Goes(_) => {}
+            Outcome::Done => self.finish(step),
             Outcome::Failed(reason, motor) => {
                 self.end_procedure(Progress::Failed, reason, motor);
-                None
             }
         }
     }
@@ -218,6 +225,7 @@ impl Core {
         if self.procedure.found == WHOLE {
             self.settings.calibration.serial = self.settings.serial;
         }
+        self.prepare();
         // The angles that were known are those of another calibration.
         self.encoders = [Encoder::new(&self.settings.motor); 3];
     }
@@ -396,7 +404,8 @@ impl Core {
 
     /// Looks at the sensors for a while, the bridges off, then at everything else.
     fn test_sensors(&mut self, raw: &Sample) -> Outcome {
-        let seen = self.settings.calibration.apply(*raw);
+        let mut seen = *raw;
+        self.correction.apply(&mut seen);
         let is_valid = raw.absolute.iter().all(Option::is_some);
         self.procedure.check(Check::Absolute, is_valid);
         let mut both = seen.absolute.into_iter().zip(self.encoders.each_ref());

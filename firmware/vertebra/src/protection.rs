@@ -31,11 +31,11 @@ const LOST_TICKS: u8 = 250;
 
 impl Core {
     /// Holds every reading against its limit and decides what may be enabled.
-    pub fn watch(&mut self, sample: &Sample) {
-        self.note_refusals(sample);
-        self.find_faults(sample);
+    pub fn watch(&mut self) {
+        self.note_refusals();
+        self.find_faults();
         self.take_faults();
-        if sample.emergency_stop {
+        if self.sample.emergency_stop {
             self.emergency_stop(Emergency::EMERGENCY_STOP);
         }
         if self.machine.is_enabled() && self.stream.is_lost(self.now) {
@@ -47,7 +47,9 @@ impl Core {
     }
 
     /// Notes what stands against enabling.
-    fn note_refusals(&mut self, sample: &Sample) {
+    fn note_refusals(&mut self) {
+        let reads_idle_current = self.reads_idle_current();
+        let sample = &self.sample;
         let limits = &self.settings.limits;
         let aligned = self.encoders.iter().all(Encoder::is_aligned);
         let believable = self.has_pose && is_believable(&self.pose, limits);
@@ -61,15 +63,9 @@ impl Core {
             sample.supply <= limits.supply_low.end || sample.supply >= limits.supply_high.end;
         self.status = self
             .status
-            .with(
-                Condition::Settings,
-                self.settings_lost || !self.settings.are_sound(),
-            )
-            .with(
-                Condition::Calibration,
-                self.settings.calibration.serial != self.settings.serial,
-            )
-            .with(Condition::CurrentOffset, self.reads_idle_current(sample))
+            .with(Condition::Settings, self.settings_lost || !self.is_sound)
+            .with(Condition::Calibration, !self.is_calibrated)
+            .with(Condition::CurrentOffset, reads_idle_current)
             .with(Condition::Encoders, !aligned)
             .with(Condition::Pose, aligned && !believable)
             .with(Condition::Voltage, voltage)
@@ -80,13 +76,14 @@ impl Core {
     }
 
     /// Tells whether a current sensor reads a current that can't be, the bridges being off.
-    fn reads_idle_current(&mut self, sample: &Sample) -> bool {
-        if self.is_open != [true; 3] {
+    fn reads_idle_current(&mut self) -> bool {
+        let [one, two, three] = self.is_open;
+        if !(one && two && three) {
             self.idle = [0; 3];
             return false;
         }
         let mut is_wrong = false;
-        for (idle, current) in self.idle.iter_mut().zip(sample.current) {
+        for (idle, current) in self.idle.iter_mut().zip(self.sample.current) {
             // A low pass of 64 ticks.
             *idle += i64::from(current.to_microamps()) - *idle / 64;
             is_wrong |=
@@ -96,7 +93,8 @@ impl Core {
     }
 
     /// Finds what is wrong with this vertebra: some of it always, some while its drives are on.
-    fn find_faults(&mut self, sample: &Sample) {
+    fn find_faults(&mut self) {
+        let sample = &self.sample;
         if self.status.contains(Condition::Settings) {
             self.pending.fault(Emergency::SETTINGS_INVALID, None, 0);
         }
@@ -107,13 +105,13 @@ impl Core {
             return;
         }
         let limits = &self.settings.limits;
-        let centivolts = (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
+        let centivolts = || (sample.supply.to_millivolts() / 10).clamp(0, 0xFFFF) as u16;
         if sample.supply <= limits.supply_low.end {
             self.pending
-                .fault(Emergency::UNDER_VOLTAGE, None, centivolts);
+                .fault(Emergency::UNDER_VOLTAGE, None, centivolts());
         } else if sample.supply >= limits.supply_high.end {
             self.pending
-                .fault(Emergency::OVER_VOLTAGE, None, centivolts);
+                .fault(Emergency::OVER_VOLTAGE, None, centivolts());
         }
         let decidegrees = |value: Temperature| value.to_decidegrees() as u16;
         if sample.board_temperature >= limits.board_hot.end {
@@ -134,7 +132,7 @@ impl Core {
             let fault = Emergency::WINDING_OVER_TEMPERATURE;
             self.pending.fault(fault, Some(motor), detail);
         }
-        self.find_over_current(sample);
+        self.find_over_current();
     }
 
     /// Returns the first motor whose winding is hotter than its current should let it become.
@@ -144,14 +142,14 @@ impl Core {
 
     /// Finds a current that is far above what the bridge is ever told: the loop has seen it, or its mean
     /// is, as that of a braked motor may be.
-    fn find_over_current(&mut self, sample: &Sample) {
+    fn find_over_current(&mut self) {
+        let Sample {
+            current,
+            over_current,
+            ..
+        } = self.sample;
         let hard = hard_limit(self.settings.motor.current_limit);
-        for (motor, (current, tripped)) in sample
-            .current
-            .into_iter()
-            .zip(sample.over_current)
-            .enumerate()
-        {
+        for (motor, (current, tripped)) in current.into_iter().zip(over_current).enumerate() {
             if tripped || current.abs() > hard {
                 let milliamps = current.abs().to_microamps() / 1_000;
                 let detail = milliamps.min(0xFFFF) as u16;

@@ -9,7 +9,7 @@ use eel_units::{AngularVelocity, Torque};
 
 use crate::core::Core;
 use crate::impedance::{FeedForward, Motion};
-use crate::io::{Drive, Sample};
+use crate::io::Drive;
 
 /// Speed of a crank above which a commissioned motor is braked: 1 rad/s.
 const CRANK_SPEED: AngularVelocity = AngularVelocity::from_milliradians_per_second(1_000);
@@ -25,13 +25,8 @@ impl Core {
     }
 
     /// Lets each motor produce the torque that it is told, within its bounds.
-    pub fn drive_motors(
-        &mut self,
-        motion: &Motion,
-        cap: Option<Torque>,
-        sample: &Sample,
-    ) -> [Drive; 3] {
-        let bounds = self.bounds(cap, sample);
+    pub fn drive_motors(&mut self, motion: &Motion, cap: Option<Torque>) -> [Drive; 3] {
+        let bounds = self.bounds(cap);
         let limits = bounds.each_ref().map(|motor| motor.torque);
         let mut torques = self.motor_torque;
         for (torque, speed) in torques.iter_mut().zip(self.speeds()) {

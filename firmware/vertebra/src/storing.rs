@@ -7,53 +7,99 @@ use eel_units::Instant;
 use crate::store::{Record, StoreError};
 use crate::vertebra::Vertebra;
 
+/// How far the making of a record is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Stage {
+    /// None is being made, or the platform has it.
+    #[default]
+    Idle,
+    /// It is to be begun with what is stored.
+    Begin(StoreRequest),
+    /// The communication parameters come next.
+    Communication(StoreRequest),
+    /// The settings come next.
+    Settings(StoreRequest),
+    /// It is whole.
+    Whole,
+}
+
 impl Vertebra {
-    /// Makes what is to be stored of what is there at this moment: it may change before the platform is
-    /// ready to store it.
-    #[inline(never)] // One copy in flash.
+    /// Takes what the bus asks for; it waits for the outcome, and changes nothing meanwhile.
     pub(crate) fn prepare_store(&mut self, request: StoreRequest) {
-        let mut record = self.storing.stored.clone();
-        match request {
-            StoreRequest::Save(group) => {
-                if group.has_communication() {
-                    let mut saved = [0; STORED_PARAMETERS];
-                    let length = self.node.save_parameters(&mut saved).unwrap_or_default();
-                    record.communication.clear();
-                    // A record holds as much as a node saves.
-                    let saved = saved.get(..length).unwrap_or_default();
-                    let _ = record.communication.extend_from_slice(saved);
-                }
-                if group.has_application() {
-                    record.keep_settings(&self.core.settings);
-                }
-            }
-            StoreRequest::Restore(group) => {
-                if group.has_communication() {
-                    record.communication.clear();
-                }
-                if group.has_application() {
-                    record.forget_settings();
-                }
-            }
-            StoreRequest::NodeId(id) => record.node = NodeId::new(id),
-        }
-        // What was lost stays lost until settings are stored or restored.
-        let is_mended = match request {
-            StoreRequest::Save(group) | StoreRequest::Restore(group) => group.has_application(),
-            StoreRequest::NodeId(_) => false,
-        };
-        record.lost = self.core.settings_lost && !is_mended;
-        self.storing.coming = Some(record);
-        self.storing.is_taken = false;
+        self.storing.coming = None;
+        self.storing.stage = Stage::Begin(request);
     }
 
     /// Returns what the platform shall store now, once for each request; it then calls
     /// [`finish_store`](Self::finish_store), before or after other turns. The bus waits for a second.
-    pub fn poll_store(&mut self) -> Option<Record> {
-        if core::mem::replace(&mut self.storing.is_taken, true) {
+    /// Call it once after each turn: what is asked for is made in four of these calls, so that none takes
+    /// long.
+    pub fn poll_store(&mut self) -> Option<&Record> {
+        if self.storing.stage == Stage::Idle {
             return None;
         }
-        self.storing.coming.clone()
+        self.go_on_storing()
+    }
+
+    /// Makes what is asked for at once, before a command of NMT changes what it is made of.
+    #[inline]
+    pub(crate) fn hasten_store(&mut self) {
+        while !matches!(self.storing.stage, Stage::Idle | Stage::Whole) {
+            let _ = self.go_on_storing();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn go_on_storing(&mut self) -> Option<&Record> {
+        let stage = self.storing.stage;
+        let Some(record) = &mut self.storing.coming else {
+            if let Stage::Begin(request) = stage {
+                self.storing.coming = Some(self.storing.stored.clone());
+                self.storing.stage = Stage::Communication(request);
+            }
+            return None;
+        };
+        self.storing.stage = match stage {
+            Stage::Idle | Stage::Begin(_) => Stage::Idle,
+            Stage::Communication(request) => {
+                match request {
+                    StoreRequest::Save(group) if group.has_communication() => {
+                        // A record holds as much as a node saves.
+                        let all = &mut record.communication;
+                        let _ = all.resize_default(STORED_PARAMETERS);
+                        let length = self.node.save_parameters(all).unwrap_or_default();
+                        all.truncate(length);
+                    }
+                    StoreRequest::Restore(group) if group.has_communication() => {
+                        record.communication.clear();
+                    }
+                    StoreRequest::NodeId(id) => record.node = NodeId::new(id),
+                    StoreRequest::Save(_) | StoreRequest::Restore(_) => {}
+                }
+                Stage::Settings(request)
+            }
+            Stage::Settings(request) => {
+                let mut is_mended = true;
+                match request {
+                    StoreRequest::Save(group) if group.has_application() => {
+                        record.keep_settings(&self.core.settings);
+                    }
+                    StoreRequest::Restore(group) if group.has_application() => {
+                        record.forget_settings();
+                    }
+                    // What was lost stays lost until settings are stored or restored.
+                    _ => is_mended = false,
+                }
+                record.lost = self.core.settings_lost && !is_mended;
+                Stage::Whole
+            }
+            Stage::Whole => {
+                self.storing.stage = Stage::Idle;
+                return self.storing.coming.as_ref();
+            }
+        };
+        None
     }
 
     /// Hears what became of what [`poll_store`](Self::poll_store) returned, and answers the bus. What is

@@ -14,12 +14,13 @@ use crate::core::Core;
 use crate::events::Event;
 use crate::freezing::Clock;
 use crate::io::{Drive, Sample};
-use crate::keepsake::{Keepsake, Kept};
+use crate::keepsake::Keepsake;
 use crate::procedure::Hands;
 use crate::records::Records;
 use crate::served::Served;
 use crate::settings::Settings;
 use crate::store::{Record, Stored};
+use crate::storing::Stage;
 use crate::thermal::Thermal;
 
 /// One vertebra: frames and samples in, drives and frames out.
@@ -31,7 +32,6 @@ pub struct Vertebra {
     /// What the platform made it with, before what is stored.
     settings: Settings,
     pub(crate) storing: Storing,
-    pub(crate) kept: Kept,
 }
 
 /// What NMT "reset node" goes back to, and what is to become it.
@@ -41,8 +41,8 @@ pub(crate) struct Storing {
     pub stored: Record,
     /// What the bus has asked for, until it is stored.
     pub coming: Option<Record>,
-    /// Whether the platform has taken it.
-    pub is_taken: bool,
+    /// How far that is.
+    pub stage: Stage,
 }
 
 /// Does one turn: all frames in their order, the sample, then what is to be sent, at most `room`
@@ -102,7 +102,6 @@ impl Vertebra {
                 stored: record,
                 ..Storing::default()
             },
-            kept: Kept::default(),
         };
         vertebra.core.settings_lost = is_damaged || is_refused;
         vertebra.take_settings();
@@ -118,6 +117,9 @@ impl Vertebra {
     /// Takes a frame from the bus.
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         self.core.now = now;
+        if frame.cob_id() == Some(Cob::Nmt.id()) {
+            self.hasten_store();
+        }
         let mut served = Served {
             core: &mut self.core,
             records: &mut self.records,
@@ -145,6 +147,16 @@ impl Vertebra {
         served.capture();
         self.hand_over_emergencies(now);
         drives
+    }
+
+    /// Returns by how much the platform shall make the next tick longer than a millisecond, ns.
+    pub fn tick_trim_ns(&self) -> i32 {
+        self.core.discipline.trim_ns()
+    }
+
+    /// Tells whether ticks keep their time after SYNC.
+    pub fn tick_is_locked(&self) -> bool {
+        self.core.discipline.is_locked()
     }
 
     /// Returns the next frame to send.

@@ -307,6 +307,7 @@ fn sample(random: &mut Random) -> Sample {
             .map(|ordinary| Temperature::from_decidegrees(any(random, ordinary))),
         bridge_fault: [false; 3].map(|_| random.once_in(12)),
         over_current: [false; 3].map(|_| random.once_in(12)),
+        sync_age: None,
         emergency_stop: random.once_in(12),
     }
 }

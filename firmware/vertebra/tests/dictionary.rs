@@ -5,7 +5,8 @@ use eel_protocol::dictionary::{self, DataType, Field, Object, Sub, entries};
 use eel_protocol::{Condition, Mode, State};
 use eel_units::{Current, Duration, Temperature, Voltage};
 
-use support::{Bench, NODE, pose};
+use eel_vertebra::{Calibration, Settings};
+use support::{Bench, NODE, node, pose};
 
 mod support;
 
@@ -129,7 +130,10 @@ fn every_entry_is_read_with_its_length() {
 
 #[test]
 fn a_fresh_vertebra_has_the_defaults_of_the_table() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::with(Settings {
+        calibration: Calibration::NONE,
+        ..Settings::prototype(node(), 77)
+    });
     for (object, sub) in numbers().filter(|(_, sub)| sub.access != Access::ReadOnly) {
         let bytes = read(&mut bench, object.index, sub.subindex).unwrap();
         let value = sub.data_type.decode(&bytes).unwrap();
@@ -199,6 +203,7 @@ fn settings_are_refused_in_operation_and_while_anything_drives_the_wrist() {
 fn refuses(bench: &mut Bench) {
     for (index, sub) in settings() {
         let bytes = encode(sub.data_type, sub.max);
+        let before = number(bench, sub.field);
         let refused = write(bench, index, sub.subindex, &bytes);
         assert_eq!(
             refused,
@@ -207,7 +212,7 @@ fn refuses(bench: &mut Bench) {
             sub.name,
             bench.state()
         );
-        assert_eq!(number(bench, sub.field), sub.default);
+        assert_eq!(number(bench, sub.field), before);
     }
 }
 
@@ -330,14 +335,31 @@ fn timing_tells_how_long_a_turn_takes_and_where_sync_lies() {
     bench.vertebra.note_loop_time(Duration::from_micros(90));
     assert_eq!(number(&mut bench, Field::LoopLast), 90);
     assert_eq!(number(&mut bench, Field::LoopMax), 250);
+    // The platform measures SYNC; what it never tells is never followed.
     bench.run(1_000);
-    assert_eq!(number(&mut bench, Field::SyncPhase), 0);
-    // One SYNC two milliseconds late.
-    bench.run(10 - bench.millis % 10);
-    bench.sync = false;
-    bench.run(11);
-    let late = bench.next_sync();
-    bench.extra.push(late);
-    bench.tick();
-    assert_eq!(number(&mut bench, Field::SyncPhase), 2_000);
+    for field in [Field::SyncPhase, Field::TickTrim, Field::TickLocked] {
+        assert_eq!(number(&mut bench, field), 0, "{field:?}");
+    }
+    let mut syncs = |bench: &mut Bench, age_us, count| {
+        for _ in 0..count {
+            bench.sample.sync_age = Some(Duration::from_micros(age_us));
+            bench.tick();
+            bench.sample.sync_age = None;
+            bench.run(9);
+        }
+    };
+    syncs(&mut bench, 380, 3);
+    assert_eq!(number(&mut bench, Field::SyncPhase), 80);
+    // 80 µs too late: an eighth of it in the 10 ticks until the next SYNC, and a little that is learnt.
+    let trim = number(&mut bench, Field::TickTrim);
+    assert!((-1_200..=-1_000).contains(&trim), "{trim} ns");
+    assert_eq!(trim, i64::from(bench.vertebra.tick_trim_ns()));
+    syncs(&mut bench, 310, 20);
+    assert_eq!(number(&mut bench, Field::TickLocked), 1);
+    bench.run(250);
+    assert_eq!(
+        number(&mut bench, Field::TickLocked),
+        0,
+        "no SYNC for 200 ms"
+    );
 }

@@ -3,7 +3,7 @@
 use eel_canopen::{Frame, NmtCommand};
 use eel_protocol::emergency::Emergency;
 use eel_protocol::{Condition, Mode, NodeId, State, identity};
-use eel_vertebra::store::{RAM_PAGE, StoreError, Stored};
+use eel_vertebra::store::{RAM_PAGE, Record, StoreError, Stored};
 use eel_vertebra::{Drive, Event, Settings};
 
 use support::{Bench, NODE, faulty, node};
@@ -134,12 +134,12 @@ fn what_was_asked_for_is_stored_even_if_a_reset_follows_at_once() {
             let reset = Frame::standard(0, &[command as u8, 0]).unwrap();
             let now = bench.now();
             bench.vertebra.handle_frame(now, &save);
-            let early = (ticks > 0).then(|| bench.vertebra.poll_store().unwrap());
+            let early = (ticks > 0).then(|| asked(&mut bench));
             bench.vertebra.handle_frame(now, &reset);
             for _ in 0..ticks {
                 bench.tick();
             }
-            let record = early.unwrap_or_else(|| bench.vertebra.poll_store().unwrap());
+            let record = early.unwrap_or_else(|| asked(&mut bench));
             bench.store.save(&record).unwrap();
             let now = bench.now();
             bench.vertebra.finish_store(now, Ok(()));
@@ -169,8 +169,8 @@ fn a_flash_that_fails_is_told_and_the_old_settings_stay() {
     let frame = Frame::standard(0x600 + u16::from(NODE), &request).unwrap();
     let now = bench.now();
     bench.vertebra.handle_frame(now, &frame);
-    let asked = bench.vertebra.poll_store();
-    assert!(asked.is_some_and(|record| !record.is_empty()));
+    let asked = asked(&mut bench);
+    assert!(!asked.is_empty());
     assert_eq!(bench.vertebra.poll_store(), None, "once");
     bench.vertebra.finish_store(now, Err(StoreError::Verify));
     let answer = std::iter::from_fn(|| bench.vertebra.poll_transmit())
@@ -238,10 +238,17 @@ fn a_torn_page_beside_a_good_one_is_nothing_to_worry_about() {
     assert!(!bench.holds(Condition::Settings));
 }
 
+/// Polls for what is to be stored until it is made.
+fn asked(bench: &mut Bench) -> Record {
+    let found = (0..8).find_map(|_| bench.vertebra.poll_store().cloned());
+    found.expect("a record in a few calls")
+}
+
 fn lss(bench: &mut Bench, request: [u8; 8]) -> Vec<[u8; 8]> {
     let from = bench.sent.len();
     bench.extra.push(Frame::standard(0x7E5, &request).unwrap());
-    bench.run(2);
+    // What is stored is made in four ticks.
+    bench.run(6);
     let sent = bench.sent[from..].iter();
     sent.filter(|sent| sent.frame.cob_id() == Some(0x7E4))
         .map(|sent| sent.frame.data().try_into().unwrap())

@@ -187,6 +187,7 @@ impl Wrist {
             motor_temperature: std::array::from_fn(|i| decidegrees(self.motors[i].housing_c)),
             bridge_fault: [false; 3],
             over_current: self.power.tripped(),
+            sync_age: None,
             emergency_stop: false,
         })
     }

@@ -2,7 +2,8 @@
 
 use std::collections::VecDeque;
 
-use eel_protocol::Frame;
+use eel_protocol::{Cob, Frame};
+use eel_units::Duration;
 
 use crate::bus::{Bus, ControllerConfig, ControllerId};
 
@@ -16,6 +17,8 @@ pub const SENDING: usize = 8;
 pub struct Link {
     controller: ControllerId,
     received: Vec<Frame>,
+    /// When the newest SYNC arrived that nobody has asked for.
+    sync_ns: Option<u64>,
     waiting: VecDeque<Frame>,
     overruns: u64,
     dropped: u64,
@@ -33,6 +36,7 @@ impl Link {
         Ok(Self {
             controller,
             received: Vec::with_capacity(DEPTH),
+            sync_ns: None,
             waiting: VecDeque::with_capacity(DEPTH),
             overruns: 0,
             dropped: 0,
@@ -43,6 +47,9 @@ impl Link {
     pub fn serve(&mut self, bus: &mut Bus, now_ns: u64) {
         if bus.has_received(self.controller) {
             while let Some((_, frame)) = bus.receive(self.controller) {
+                if frame.cob_id() == Some(Cob::Sync.id()) {
+                    self.sync_ns = Some(now_ns);
+                }
                 if self.received.len() < DEPTH {
                     self.received.push(frame);
                 } else {
@@ -73,6 +80,12 @@ impl Link {
         SENDING.saturating_sub(self.waiting.len())
     }
 
+    /// Returns how long ago the newest SYNC arrived, where one has since the last call.
+    pub fn sync_age(&mut self, now_ns: u64) -> Option<Duration> {
+        let age_ns = now_ns.saturating_sub(self.sync_ns.take()?);
+        Some(Duration::from_micros((age_ns / 1_000) as u32))
+    }
+
     /// Takes what was received since the last call.
     pub fn received(&mut self) -> Vec<Frame> {
         std::mem::take(&mut self.received)
@@ -82,6 +95,7 @@ impl Link {
     pub fn power(&mut self, bus: &mut Bus, now_ns: u64, on: bool) {
         bus.set_powered(now_ns, self.controller, on);
         self.received.clear();
+        self.sync_ns = None;
         self.waiting.clear();
     }
 

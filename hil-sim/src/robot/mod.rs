@@ -23,6 +23,7 @@ use crate::bus::{
     BitRate, Bus, ControllerConfig, Event as BusEvent, Fifo, Filter, FilterMatch, Statistics,
     TransmitMode,
 };
+use crate::plant::random::Random;
 use crate::plant::{Config as PlantConfig, Plant};
 
 pub use clock::{PLANT_STEP_NS, TICK_NS};
@@ -52,6 +53,8 @@ pub struct Config {
     pub faults: Vec<Fault>,
     /// Bits a second on the bus.
     pub bitrate: u32,
+    /// How wrong the vertebrae's clocks are at most, ppm; which one is how wrong, the seed says.
+    pub clock_ppm: i32,
 }
 
 impl Config {
@@ -64,6 +67,7 @@ impl Config {
             seed,
             faults: Vec::new(),
             bitrate: 1_000_000,
+            clock_ppm: 50,
         }
     }
 }
@@ -137,7 +141,7 @@ impl Robot {
         faults.sort_by_key(|fault| fault.at_ns);
         Ok(Self {
             now_ns: 0,
-            schedule: Schedule::new(),
+            schedule: Schedule::new(clocks(config)),
             bus,
             plant: Plant::new(&config.plant, config.seed),
             head: Head::new(config.head, Instant::ZERO),
@@ -151,15 +155,23 @@ impl Robot {
 
     /// Lets time pass up to `to_ns`.
     pub fn run(&mut self, to_ns: u64, observer: &mut impl Observer) {
-        while self.schedule.next_ns() <= to_ns {
-            let (at_ns, happening) = self.schedule.take();
+        loop {
+            let (at_ns, happening) = self.schedule.next();
+            if at_ns > to_ns {
+                break;
+            }
             self.advance_bus(at_ns, observer);
             self.now_ns = at_ns;
+            let mut trim_ns = 0;
             match happening {
                 Happening::Plant => self.step_plant(),
                 Happening::Head => self.tick_head(observer),
-                Happening::Node(index) => self.tick_node(index, observer),
+                Happening::Node(index) => {
+                    self.tick_node(index, observer);
+                    trim_ns = self.nodes[index].node.tick_trim_ns();
+                }
             }
+            self.schedule.take(happening, trim_ns);
         }
         self.advance_bus(to_ns, observer);
         self.now_ns = to_ns;
@@ -277,8 +289,9 @@ impl Robot {
             return;
         }
         let now = instant(self.now_ns);
-        let sample: Sample = self.plant.sample(index);
+        let mut sample: Sample = self.plant.sample(index);
         let seat = &mut self.nodes[index];
+        sample.sync_age = seat.link.sync_age(self.now_ns);
         let frames = seat.link.received();
         let mut sent = Vec::new();
         let room = seat.link.room();
@@ -296,6 +309,12 @@ impl Robot {
         };
         observer.turn(seat.id, seat.node.as_ref(), &turn, &self.plant);
     }
+}
+
+/// Returns by how many ppm each vertebra's clock is too slow.
+fn clocks(config: &Config) -> [i32; NODES] {
+    let mut random = Random::new(config.seed, 500);
+    std::array::from_fn(|_| random.within(config.clock_ppm))
 }
 
 /// Returns the local clock's reading.

@@ -43,6 +43,11 @@ pub trait Node {
         sent: &mut Vec<Frame>,
     ) -> [Drive; 3];
 
+    /// Returns by how much its next tick shall be longer than a millisecond, ns.
+    fn tick_trim_ns(&self) -> i32 {
+        self.vertebra().map_or(0, Vertebra::tick_trim_ns)
+    }
+
     /// Starts anew.
     fn reset(&mut self, now: Instant, cause: Reset);
 

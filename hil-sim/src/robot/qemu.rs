@@ -43,6 +43,7 @@ pub struct QemuNode {
     to_image: ChildStdin,
     from_image: ChildStdout,
     state: State,
+    trim_ns: i32,
     failure: Option<anyhow::Error>,
     /// What the image calls its pipes; gone with the node.
     _folder: TempDir,
@@ -93,6 +94,7 @@ impl QemuNode {
             to_image,
             from_image,
             state: State::NotReady,
+            trim_ns: 0,
             failure: None,
             _folder: folder,
         };
@@ -104,6 +106,7 @@ impl QemuNode {
         self.start.now = now;
         self.start.failed = cause == Reset::Failure;
         self.state = State::NotReady;
+        self.trim_ns = 0;
         let packet = self.start.encode();
         self.to_image.write_all(packet.as_bytes())?;
         Ok(())
@@ -171,6 +174,7 @@ impl Node for QemuNode {
                         self.state = report.state;
                     }
                 }
+                self.trim_ns = output.trim_ns;
                 sent.extend(output.frames);
                 output.drives
             }
@@ -193,6 +197,10 @@ impl Node for QemuNode {
 
     fn poll_event(&mut self) -> Option<Event> {
         None
+    }
+
+    fn tick_trim_ns(&self) -> i32 {
+        self.trim_ns
     }
 
     /// Returns what the last pose report said.

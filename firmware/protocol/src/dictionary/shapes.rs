@@ -252,3 +252,10 @@ pub(super) const STEP: Shape = Shape {
     max: 5,
     ..byte(RW, NO)
 };
+/// The trim of a tick, within 5 µs.
+pub(super) const TICK_TRIM: Shape = Shape {
+    data_type: DataType::I16,
+    min: -5_000,
+    max: 5_000,
+    ..NANOSECONDS
+};

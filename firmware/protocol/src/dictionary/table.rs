@@ -201,10 +201,13 @@ records! {
         1 LoopLast "loop_last" MICROSECONDS, "Time that the last control tick took.";
         2 LoopMax "loop_max" MICROSECONDS, "Longest time that a control tick took since power-up.";
         3 SyncPhase "sync_phase" SYNC_PHASE,
-            "Arrival of the last SYNC against the control tick's own grid.";
+            "By how much the control tick came too late after the last SYNC, 0.3 ms being right.";
         4 CurrentLoopLast "current_loop_last" NANOSECONDS, "Time that the last turn of the current loop took.";
         5 CurrentLoopMax "current_loop_max" NANOSECONDS,
             "Longest time that a turn of the current loop took since power-up.";
+        6 TickTrim "tick_trim" TICK_TRIM, "By how much each tick is made longer to keep its time after SYNC.";
+        7 TickLocked "tick_locked" byte(RO, TX),
+            "1 while ticks keep their time after SYNC within 0.1 ms, 0 while they do not.";
     }
     SCOPE = 0x2050 "scope", "Captures up to four entries of this dictionary, tick by tick, for 2100:2." {
         1 ScopeChannel1 "channel1" CHANNEL,

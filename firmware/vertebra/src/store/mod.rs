@@ -195,10 +195,11 @@ const fn is_newer(one: u32, other: u32) -> bool {
     (one.wrapping_sub(other) as i32) > 0
 }
 
-/// Stores what a vertebra wants to be stored, at once. For platforms whose flash takes no time.
+/// Stores what a vertebra wants to be stored, at once; call it after each turn. For platforms whose flash
+/// takes no time.
 pub fn serve<F: NorFlash>(vertebra: &mut Vertebra, store: &mut Store<F>, now: Instant) {
     if let Some(record) = vertebra.poll_store() {
-        let outcome = store.save(&record);
+        let outcome = store.save(record);
         vertebra.finish_store(now, outcome);
     }
 }

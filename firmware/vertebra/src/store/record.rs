@@ -241,7 +241,8 @@ mod tests {
         assert_eq!(record().settings.len(), SETTING * count);
         for (index, subindex) in dictionary::settings() {
             let (_, sub) = dictionary::find(index, subindex).unwrap();
-            assert_eq!(prototype().value(sub.field), Some(sub.default));
+            let fresh = Settings::prototype(NodeId::FIRST, 0);
+            assert_eq!(fresh.value(sub.field), Some(sub.default));
         }
     }
 

@@ -419,6 +419,7 @@ pub fn healthy() -> Sample {
         motor_temperature: [Temperature::from_decidegrees(250); 3],
         bridge_fault: [false; 3],
         over_current: [false; 3],
+        sync_age: None,
         emergency_stop: false,
     }
 }
