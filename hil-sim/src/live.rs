@@ -21,6 +21,8 @@ pub struct Live<'a> {
     pub unconfigured: &'a [NodeId],
     /// Which were never calibrated.
     pub uncalibrated: &'a [NodeId],
+    /// The order in which the daisy line goes through the places.
+    pub chain: Option<&'a [NodeId]>,
     /// Time until the end, s; until Ctrl-C without one.
     pub seconds: Option<f64>,
     /// Where encoders start, noise of the sensors.
@@ -53,6 +55,9 @@ pub fn run(live: &Live<'_>) -> anyhow::Result<bool> {
     let plant = Config::default();
     let (nodes, unconfigured) = (live.nodes, live.unconfigured);
     let mut vertebrae = Realtime::with_unconfigured(bus, &plant, live.seed, nodes, unconfigured);
+    if let Some(order) = live.chain {
+        vertebrae.wire(order);
+    }
     for id in live.uncalibrated {
         vertebrae.uncalibrate(*id, live.seed);
     }

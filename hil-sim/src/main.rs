@@ -48,6 +48,10 @@ struct LiveArgs {
     /// refuses to be enabled until `eel calibrate` has been at it. Hands turn its wrist when it asks for it
     #[arg(long, value_name = "IDS", value_parser = node_ids)]
     uncalibrated: Option<NodeList>,
+    /// With --can: the order in which the line beside the bus goes through the places, as 3,1,2; by their
+    /// numbers without it
+    #[arg(long, value_name = "PLACES", value_parser = places)]
+    chain: Option<NodeList>,
     /// With --can: time until the end, s [0.1 to 1e6]
     #[arg(long, value_parser = between(0.1, 1e6))]
     seconds: Option<f64>,
@@ -61,6 +65,7 @@ impl LiveArgs {
     fn is_used(&self) -> bool {
         self.nodes.is_some()
             || self.uncalibrated.is_some()
+            || self.chain.is_some()
             || self.unconfigured.is_some()
             || self.seconds.is_some()
             || self.seed.is_some()
@@ -169,6 +174,15 @@ fn node_ids(text: &str) -> Result<NodeList, String> {
     Ok(NodeList(chosen))
 }
 
+/// Reads node ids in an order that counts.
+fn places(text: &str) -> Result<NodeList, String> {
+    let places = text
+        .split(',')
+        .map(|place| node_ids(place).map(|NodeList(ids)| ids));
+    let places: Vec<NodeId> = places.collect::<Result<Vec<_>, _>>()?.concat();
+    Ok(NodeList(places))
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match (&cli.command, &cli.live.can) {
@@ -177,7 +191,7 @@ fn main() -> ExitCode {
         (Some(Command::Check(args)), _) => run_checks(args),
         (None, Some(interface)) => run_live(interface, &cli.live),
         (None, None) if cli.live.is_used() => Err(anyhow::anyhow!(
-            "--nodes, --unconfigured, --uncalibrated, --seconds and --seed go with --can IFACE; to swim in simulated \
+            "--nodes, --unconfigured, --uncalibrated, --chain, --seconds and --seed go with --can IFACE; to swim in simulated \
              time, put `swim` before the options: hil-sim swim --seconds 5"
         )),
         (None, None) => run_swim(&SwimArgs::defaults()),
@@ -252,6 +266,7 @@ fn run_live(interface: &str, args: &LiveArgs) -> anyhow::Result<bool> {
         .unwrap_or_else(|| NodeList(NodeId::all().collect()));
     let unconfigured = args.unconfigured.as_ref().map_or(&[][..], |list| &list.0);
     let uncalibrated = args.uncalibrated.as_ref().map_or(&[][..], |list| &list.0);
+    let chain = args.chain.as_ref().map(|list| &list.0[..]);
     let (seconds, seed) = (args.seconds, args.seed.unwrap_or(1));
     interrupt::listen()?;
     live::run(&live::Live {
@@ -259,6 +274,7 @@ fn run_live(interface: &str, args: &LiveArgs) -> anyhow::Result<bool> {
         nodes: &nodes.0,
         unconfigured,
         uncalibrated,
+        chain,
         seconds,
         seed,
     })

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant as HostInstant, SystemTime, UNIX_EPOCH};
 use eel_protocol::{Frame, NodeId};
 use eel_transport::{Bus, BusError, Received};
 use eel_units::Instant;
-use eel_vertebra::{Drive, Hands, Vertebra};
+use eel_vertebra::{Drive, Hands, Sample, Vertebra};
 
 use crate::plant::joint::Target;
 use crate::plant::{Config as PlantConfig, Mounting, Plant};
@@ -61,6 +61,8 @@ pub struct Realtime<B> {
     local: Vec<(usize, Frame)>,
     /// Those that were never calibrated, and where hands hold each: yaw, pitch, roll, rad.
     handled: Vec<(NodeId, [f64; 3])>,
+    /// The order in which the daisy line goes through the places.
+    chain: Vec<NodeId>,
     incoming: Vec<Frame>,
     /// What came after the millisecond that the last tick stood for.
     held: Option<Received>,
@@ -102,11 +104,26 @@ impl<B: Bus> Realtime<B> {
             drives: [[Drive::Off; 3]; NODES],
             local: Vec::new(),
             handled: Vec::new(),
+            chain: NodeId::all().collect(),
             incoming: Vec::new(),
             held: None,
             outgoing: VecDeque::new(),
             counters: Counters::default(),
         }
+    }
+
+    /// Lets the daisy line go through the places in this order, as if somebody had put the vertebrae together
+    /// so. A place that is not named has nothing at its IN, which is high then.
+    pub fn wire(&mut self, order: &[NodeId]) {
+        self.chain = order.to_vec();
+    }
+
+    /// Returns the level at a place's IN: the OUT of the one before it, where that is here.
+    fn chain_in(&self, id: NodeId) -> bool {
+        let place = self.chain.iter().position(|other| *other == id);
+        let before = place.and_then(|place| place.checked_sub(1));
+        let before = before.and_then(|before| self.node(self.chain[before]));
+        before.is_none_or(Node::chain_out)
     }
 
     /// Builds a vertebra's motors and sensors in at random, by the seed of the sensors, and lets it know
@@ -192,13 +209,21 @@ impl<B: Bus> Realtime<B> {
             0
         };
         let (heard, mut frames, mut sent) = (std::mem::take(&mut self.local), vec![], vec![]);
-        for (id, node) in &mut self.nodes {
+        let levels: Vec<bool> = self
+            .nodes
+            .iter()
+            .map(|(id, _)| self.chain_in(*id))
+            .collect();
+        for ((id, node), chain_in) in self.nodes.iter_mut().zip(levels) {
             let index = id.index();
             frames.clear();
             let others = heard.iter().filter(|(sender, _)| *sender != index);
             frames.extend(others.map(|(_, frame)| *frame));
             frames.extend_from_slice(&self.incoming);
-            let sample = self.plant.sample(index);
+            let sample = Sample {
+                chain_in,
+                ..self.plant.sample(index)
+            };
             self.drives[index] = node.turn(now, &frames, &sample, room, &mut sent);
             self.local
                 .extend(sent.drain(..).map(|frame| (index, frame)));

@@ -15,7 +15,7 @@ const BOARD: &str = "firmware/board-stm32g474/src";
 /// Pins that work without being named by the program: the crystal's and the debugger's.
 const UNNAMED: [&str; 4] = ["PF0", "PF1", "PA13", "PA14"];
 /// Functions in the pin table of main.rs.
-const FUNCTIONS: usize = 15;
+const FUNCTIONS: usize = 16;
 
 /// Returns a text of the repository.
 fn text(path: &str) -> String {

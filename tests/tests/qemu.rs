@@ -257,6 +257,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                 let mut output = Output {
                     drives: [Drive::Off; 3],
                     trim_ns: 0,
+                    chain_out: false,
                     frames: Default::default(),
                 };
                 let heard = input.frames.iter().copied();
@@ -268,6 +269,7 @@ fn run_natively(script: &[Step]) -> Vec<Output> {
                         .expect("room for what was asked for");
                 });
                 output.trim_ns = vertebra.tick_trim_ns();
+                output.chain_out = vertebra.chain_out();
                 store::serve(vertebra, &mut store, input.now);
                 kept = vertebra.poll_keepsake().unwrap_or(kept);
                 outputs.push(output);

@@ -13,6 +13,9 @@ mod calibrating;
 #[path = "socketcan/can_utils.rs"]
 mod can_utils;
 #[cfg(target_os = "linux")]
+#[path = "socketcan/chain.rs"]
+mod chain;
+#[cfg(target_os = "linux")]
 #[path = "socketcan/chosen_nodes.rs"]
 mod chosen_nodes;
 #[cfg(target_os = "linux")]

@@ -97,6 +97,7 @@ fn run() -> Result<(), Failure> {
                 let made = lockstep::Output {
                     drives,
                     trim_ns: vertebra.tick_trim_ns(),
+                    chain_out: vertebra.chain_out(),
                     frames,
                 };
                 output.write_all(made.encode().as_bytes())?;

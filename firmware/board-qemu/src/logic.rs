@@ -64,6 +64,7 @@ mod image {
         let made = lockstep::Output {
             drives,
             trim_ns,
+            chain_out: vertebra.chain_out(),
             frames,
         };
         black_box(made.encode().as_bytes());

@@ -6,7 +6,10 @@ use eel_protocol::NodeId;
 use eel_units::{Duration as Span, Instant as Moment};
 use eel_vertebra::store::{StoreError, Stored};
 use eel_vertebra::{Event, Identifiers, Keepsake, Sample, Settings, Vertebra, turn};
+use embassy_stm32::Peri;
 use embassy_stm32::can::Properties;
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::peripherals::{PB3, PB5};
 use embassy_time::{Duration, Instant, Ticker, Timer};
 
 use crate::bridges::{self, Bridges};
@@ -28,6 +31,8 @@ pub struct Hardware {
     pub counters: crate::sensors::CounterConnections,
     /// Crank encoders.
     pub cranks: CrankConnections,
+    /// The daisy line's IN and OUT.
+    pub chain: (Peri<'static, PB5>, Peri<'static, PB3>),
     /// What the CAN controller lets pass.
     pub filters: Properties,
 }
@@ -55,6 +60,8 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         bridges::force_off();
         return;
     };
+    let chain_in = Input::new(hardware.chain.0, Pull::Up);
+    let mut chain_out = Output::new(hardware.chain.1, Level::Low, Speed::Low);
     let mut currents = Currents::new(hardware.currents);
     let mut counters = Counters::new(hardware.counters);
     let mut ticker = Ticker::every(Duration::from_millis(1));
@@ -82,7 +89,10 @@ pub async fn run(hardware: Hardware, birth: Birth) {
         due_ns = (due_ns + TICK_NS).saturating_add_signed(vertebra.tick_trim_ns().into());
         Timer::at(Instant::from_micros(due_ns / 1_000)).await;
         let start = Instant::now();
-        let sample = measure(&mut bridges, &mut currents, &mut counters, &mut cranks);
+        let sample = Sample {
+            chain_in: chain_in.is_high(),
+            ..measure(&mut bridges, &mut currents, &mut counters, &mut cranks)
+        };
         let frames = core::iter::from_fn(|| bus::RECEIVED.try_receive().ok()).take(bus::QUEUE);
         let drives = turn(
             &mut vertebra,
@@ -93,6 +103,7 @@ pub async fn run(hardware: Hardware, birth: Birth) {
             bus::send,
         );
         bridges.apply(drives, sample.supply);
+        chain_out.set_level(vertebra.chain_out().into());
         // Before anybody can answer what the turn sends: a boot-up under a new node id, say.
         let identifiers = vertebra.identifiers();
         if identifiers != heard {
@@ -139,6 +150,7 @@ fn measure(
         bridge_fault: from_fn(|motor| faults[motor] || measured.is_faulty[motor]),
         over_current: power::tripped(),
         sync_age: bus::sync_age(),
+        chain_in: true,
         emergency_stop: bridges.take_emergency_stop(),
     }
 }

@@ -38,27 +38,24 @@ struct Note {
 }
 
 /// Memory that start-up leaves alone.
-struct Kept(UnsafeCell<Note>);
+struct Kept<T>(UnsafeCell<T>);
 
-// SAFETY: written with interrupts off just before a reset, read once before they are on.
-unsafe impl Sync for Kept {}
+// SAFETY: both are read once before interrupts are on. The note is written with interrupts off just before a
+// reset, what the vertebra wants to be remembered by the control tick alone.
+unsafe impl<T> Sync for Kept<T> {}
 
 // SAFETY: a static that start-up leaves alone may hold any bits, and any are a valid `Note`.
 #[unsafe(link_section = ".uninit.failure")]
-static KEPT: Kept = Kept(UnsafeCell::new(Note {
+static KEPT: Kept<Note> = Kept(UnsafeCell::new(Note {
     magic: 0,
     line: 0,
     address: 0,
 }));
 
-/// What the vertebra wants to be remembered, in the same kind of memory.
-struct Remembered(UnsafeCell<[u8; KEEPSAKE_BYTES]>);
-
-// SAFETY: read once before any interrupt, then written by the control tick alone.
-unsafe impl Sync for Remembered {}
-
+/// What the vertebra wants to be remembered.
+// SAFETY: a static that start-up leaves alone may hold any bits, and any are bytes.
 #[unsafe(link_section = ".uninit.keepsake")]
-static REMEMBERED: Remembered = Remembered(UnsafeCell::new([0; KEEPSAKE_BYTES]));
+static REMEMBERED: Kept<[u8; KEEPSAKE_BYTES]> = Kept(UnsafeCell::new([0; KEEPSAKE_BYTES]));
 
 /// Returns what the vertebra remembers; call it before the control tick runs.
 pub fn remembered() -> Keepsake {

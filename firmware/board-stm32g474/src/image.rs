@@ -123,6 +123,7 @@ fn start(p: Peripherals, cause: failure::Start) -> Storage {
             lines: (p.PA5, p.PA6, p.PA7),
             select: (p.PB13, p.PB14, p.PB15),
         },
+        chain: (p.PB5, p.PB3),
         filters,
     };
     // From here on, so that no task can hang unseen before the one that feeds it has begun.

@@ -20,6 +20,7 @@
 //! | supply | PC3: ADC1_IN9 | 100 kΩ over 10 kΩ |
 //! | temperatures | PA4 board, PC4, PC5, PB2 motors: ADC2 | thermistors, see eel-drivers |
 //! | node number | PA2, PA3, PB9, PB11: 1, 2, 4, 8 | switches to ground; 1–10, all open: LSS gives it |
+//! | daisy line | PB5 in, PB3 out | OUT of the vertebra before to IN; an open IN is high |
 //! | crystal | PF0, PF1 | 24 MHz |
 //! | debugging | PA13, PA14 | SWD, RTT |
 //!

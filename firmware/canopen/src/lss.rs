@@ -53,6 +53,8 @@ pub(crate) struct Lss {
     identified: u8,
     /// Which of the four numbers a fastscan looks for.
     scanned: u8,
+    /// Whether a search for nodes without an id is for this one, as far as a line beside the bus says.
+    is_next: bool,
 }
 
 impl Lss {
@@ -63,6 +65,7 @@ impl Lss {
             selected: 0,
             identified: 0,
             scanned: 0,
+            is_next: true,
         }
     }
 
@@ -113,8 +116,13 @@ impl Lss {
         }
     }
 
+    /// Hears whether a search for nodes without an id is for this one.
+    pub const fn set_next(&mut self, is_next: bool) {
+        self.is_next = is_next;
+    }
+
     const fn is_unconfigured(&self, active: u8) -> bool {
-        !matches!(active, 1..=127) && self.pending == UNCONFIGURED
+        self.is_next && !matches!(active, 1..=127) && self.pending == UNCONFIGURED
     }
 
     fn switch(&mut self, mode: u8) -> Outcome {

@@ -267,6 +267,7 @@ mod tests {
             bridge_fault: [false; 3],
             over_current: [false; 3],
             sync_age: None,
+            chain_in: true,
             emergency_stop: false,
         }
     }

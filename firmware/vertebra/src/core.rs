@@ -1,7 +1,7 @@
 //! The vertebra behind its node: estimation, states, control, protection.
 
 use eel_canopen::EventQueue;
-use eel_kinematics::{Joints, Policy, Pose, PoseError, Side};
+use eel_kinematics::{Joints, Pose, PoseError};
 use eel_protocol::emergency::{Emergency, Severity, Source};
 use eel_protocol::freeze::FreezeFrame;
 use eel_protocol::{Condition, Counter, Effort, Flags, LimitCode, State, Status};
@@ -17,9 +17,9 @@ use crate::freezing::Clock;
 use crate::friction::Compensation;
 use crate::impedance::{FeedForward, Impedance, Motion};
 use crate::io::{Drive, Sample};
-use crate::limits::{MotorBounds, Situation, Standing, bounds};
+use crate::limits::Standing;
 use crate::machine::Machine;
-use crate::objects::{Counters, ReceivedTarget, Timing};
+use crate::objects::{ChainOut, Counters, ReceivedTarget, Timing};
 use crate::pending::Pending;
 use crate::procedure::Procedure;
 use crate::settings::Settings;
@@ -93,6 +93,8 @@ pub(crate) struct Core {
     pub sample: Sample,
     pub counters: Counters,
     pub timing: Timing,
+    /// What the daisy line's OUT does.
+    pub chain_out: ChainOut,
     pub discipline: Discipline,
     pub pending: Pending,
     pub events: EventQueue<Event, EVENTS>,
@@ -168,6 +170,7 @@ impl Core {
             sample: Sample::default(),
             counters: Counters::default(),
             timing: Timing::default(),
+            chain_out: ChainOut::Auto,
             discipline: Discipline::default(),
             pending: Pending::default(),
             events: EventQueue::default(),
@@ -418,66 +421,6 @@ impl Core {
         self.watch_following(worst.unwrap_or_default());
         self.reference = Some(reference);
         moment
-    }
-
-    /// Shares a moment among the motors within what their bounds leave beside the friction.
-    fn share(
-        &mut self,
-        motion: &Motion,
-        moment: [Torque; 3],
-        bounds: &[MotorBounds; 3],
-    ) -> [Drive; 3] {
-        let mut torques = self.friction_torques;
-        let mut limits = bounds.each_ref().map(|motor| motor.torque);
-        for (torque, bounds) in torques.iter_mut().zip(&mut limits) {
-            *torque = torque.bounded(bounds.low, bounds.high);
-            bounds.low -= *torque;
-            bounds.high -= *torque;
-        }
-        let shared = motion
-            .direct
-            .jacobian
-            .share(&moment, &limits, Policy::YawFirst);
-        self.achieved = shared.achieved;
-        self.unallocated = shared.unallocated;
-        for (torque, part) in torques.iter_mut().zip(shared.torque) {
-            *torque += part;
-        }
-        self.apply(bounds, &torques, &shared.bound)
-    }
-
-    /// Returns what each motor may produce.
-    pub fn bounds(&self, command_cap: Option<Torque>) -> [MotorBounds; 3] {
-        let situation = Situation {
-            sample: &self.sample,
-            standing: &self.standing,
-            angles: self.angles(),
-            speeds: self.speeds(),
-            command_cap,
-        };
-        bounds(&self.settings.limits, &self.electrical, &situation)
-    }
-
-    /// Lets the current loop produce torques that are within their bounds; `sides` tells which bound
-    /// holds a motor.
-    pub fn apply(
-        &mut self,
-        bounds: &[MotorBounds; 3],
-        torques: &[Torque; 3],
-        sides: &[Option<Side>; 3],
-    ) -> [Drive; 3] {
-        let mut drives = [Drive::Off; 3];
-        let motors = drives.iter_mut().zip(&mut self.effort.limit);
-        let asked = bounds
-            .iter()
-            .zip(sides)
-            .zip(torques)
-            .zip(self.encoders.each_ref());
-        for ((drive, limit), (((bounds, side), torque), encoder)) in motors.zip(asked) {
-            *limit = bounds.reason(*side);
-            *drive = Drive::Current(self.electrical.setpoint(*torque, encoder.speed()));
-        }
-        drives
     }
 
     /// Returns the speed of each motor.

@@ -25,6 +25,8 @@ pub struct Sample {
     /// How long before this tick the newest SYNC arrived, where one has since the tick before and the
     /// platform can tell.
     pub sync_age: Option<Duration>,
+    /// The daisy line's level at this vertebra's IN; high where nothing is connected.
+    pub chain_in: bool,
     /// Whether the emergency stop line is asserted.
     pub emergency_stop: bool,
 }

@@ -39,6 +39,7 @@ mod pushing;
 mod records;
 mod served;
 mod settings;
+mod sharing;
 mod spare;
 mod spline;
 pub mod store;

@@ -29,7 +29,7 @@ const NO_SYNC: u32 = u32::MAX;
 const FRAME: usize = 4 + 1 + 8;
 const DRIVES: usize = 3 * (1 + 4 + 4);
 
-const _: () = assert!(DRIVES + 4 + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
+const _: () = assert!(DRIVES + 4 + 1 + 1 + MAX_FRAMES * FRAME + HEADER <= MAX_PACKET);
 const _: () = assert!(MAX_PACKET <= u16::MAX as usize);
 
 const EXTENDED: u32 = 1 << 31;
@@ -104,6 +104,8 @@ pub struct Output {
     pub drives: [Drive; 3],
     /// By how much its next tick shall be longer than a millisecond, ns.
     pub trim_ns: i32,
+    /// The level of the daisy line's OUT.
+    pub chain_out: bool,
     /// What it sends, in this order.
     pub frames: Frames,
 }
@@ -210,11 +212,7 @@ impl Start {
         let node = NodeId::new(reader.take_u8()?).ok_or(PacketError::Value)?;
         let serial = u32::from_le_bytes(reader.take()?);
         let now = reader.take_instant()?;
-        let failed = match reader.take_u8()? {
-            0 => false,
-            1 => true,
-            _ => return Err(PacketError::Value),
-        };
+        let failed = reader.take_bool()?;
         reader.finish()?;
         Ok(Self {
             node,
@@ -274,6 +272,7 @@ impl Output {
             packet.put_i32(setpoint.emf.to_millivolts());
         }
         packet.put_i32(self.trim_ns);
+        packet.put(&[u8::from(self.chain_out)]);
         packet.put_frames(&self.frames);
         packet.finish()
     }
@@ -297,11 +296,13 @@ impl Output {
             };
         }
         let trim_ns = reader.take_i32()?;
+        let chain_out = reader.take_bool()?;
         let frames = reader.take_frames()?;
         reader.finish()?;
         Ok(Self {
             drives,
             trim_ns,
+            chain_out,
             frames,
         })
     }
@@ -326,7 +327,8 @@ fn put_sample(packet: &mut Packet, sample: &Sample) {
         packet.put_i32(temperature.to_decidegrees());
     }
     let stop = u8::from(sample.emergency_stop) << 3;
-    packet.put(&[to_bits(sample.bridge_fault) | stop | to_bits(sample.over_current) << 4]);
+    let chain = u8::from(sample.chain_in) << 7;
+    packet.put(&[to_bits(sample.bridge_fault) | stop | to_bits(sample.over_current) << 4 | chain]);
     let age = sample.sync_age.map_or(NO_SYNC, Duration::to_micros);
     packet.put(&age.to_le_bytes());
 }
@@ -357,7 +359,8 @@ fn take_sample(reader: &mut Reader<'_>) -> Result<Sample, PacketError> {
         board_temperature,
         motor_temperature,
         bridge_fault: from_bits(flags & 0x07)?,
-        over_current: from_bits(flags >> 4)?,
+        over_current: from_bits(flags >> 4 & 0x07)?,
+        chain_in: flags & 1 << 7 != 0,
         sync_age: (age != NO_SYNC).then(|| Duration::from_micros(age)),
         emergency_stop: flags & 1 << 3 != 0,
     })
@@ -390,6 +393,14 @@ impl Reader<'_> {
 
     fn take_u8(&mut self) -> Result<u8, PacketError> {
         self.take().map(|[byte]| byte)
+    }
+
+    fn take_bool(&mut self) -> Result<bool, PacketError> {
+        match self.take_u8()? {
+            0 => Ok(false),
+            1 => Ok(true),
+            _ => Err(PacketError::Value),
+        }
     }
 
     fn take_i32(&mut self) -> Result<i32, PacketError> {

@@ -31,6 +31,16 @@ pub(crate) struct Counters {
     pub transmit_overruns: u32,
 }
 
+/// What the daisy line's OUT does, object 0x2070:2.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum ChainOut {
+    /// It is high once the node has an id, so that the next vertebra may get one.
+    #[default]
+    Auto = 0,
+    Low = 1,
+    High = 2,
+}
+
 /// How long a turn takes, object 0x2040.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Timing {
@@ -155,6 +165,8 @@ impl Core {
             Field::TickLocked => i64::from(self.discipline.is_locked()),
             Field::CurrentLoopLast => i64::from(self.timing.current_loop_ns.0),
             Field::CurrentLoopMax => i64::from(self.timing.current_loop_ns.1),
+            Field::ChainIn => i64::from(self.sample.chain_in),
+            Field::ChainOut => self.chain_out as i64,
             Field::ProcedureStep => 0,
             Field::ProcedureProgress => self.procedure.progress as i64,
             Field::ProcedureReason => self.procedure.reason as i64,
@@ -204,6 +216,13 @@ impl Core {
             Field::MotorTorque1 => return self.set_motor_torque(0, value),
             Field::MotorTorque2 => return self.set_motor_torque(1, value),
             Field::MotorTorque3 => return self.set_motor_torque(2, value),
+            Field::ChainOut => {
+                self.chain_out = match value {
+                    1 => ChainOut::Low,
+                    2 => ChainOut::High,
+                    _ => ChainOut::Auto,
+                };
+            }
             Field::ProcedureStep => return self.order_procedure(value as u8),
             _ => return self.set_setting(field, value),
         }

@@ -15,6 +15,7 @@ use crate::events::Event;
 use crate::freezing::Clock;
 use crate::io::{Drive, Sample};
 use crate::keepsake::Keepsake;
+use crate::objects::ChainOut;
 use crate::procedure::Hands;
 use crate::records::Records;
 use crate::served::Served;
@@ -138,6 +139,7 @@ impl Vertebra {
             records: &mut self.records,
         };
         self.node.tick(now.to_micros(), &mut served);
+        self.node.take_part_in_search(sample.chain_in);
         self.absorb_events(now);
         let drives = self.core.tick(now, sample);
         let mut served = Served {
@@ -152,6 +154,15 @@ impl Vertebra {
     /// Returns by how much the platform shall make the next tick longer than a millisecond, ns.
     pub fn tick_trim_ns(&self) -> i32 {
         self.core.discipline.trim_ns()
+    }
+
+    /// Returns the level of the daisy line's OUT, which leads to the next vertebra's IN.
+    pub fn chain_out(&self) -> bool {
+        match self.core.chain_out {
+            ChainOut::Auto => self.node_id().is_some(),
+            ChainOut::Low => false,
+            ChainOut::High => true,
+        }
     }
 
     /// Tells whether ticks keep their time after SYNC.

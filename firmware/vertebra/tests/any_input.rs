@@ -308,6 +308,7 @@ fn sample(random: &mut Random) -> Sample {
         bridge_fault: [false; 3].map(|_| random.once_in(12)),
         over_current: [false; 3].map(|_| random.once_in(12)),
         sync_age: None,
+        chain_in: random.once_in(2),
         emergency_stop: random.once_in(12),
     }
 }

@@ -340,7 +340,7 @@ fn timing_tells_how_long_a_turn_takes_and_where_sync_lies() {
     for field in [Field::SyncPhase, Field::TickTrim, Field::TickLocked] {
         assert_eq!(number(&mut bench, field), 0, "{field:?}");
     }
-    let mut syncs = |bench: &mut Bench, age_us, count| {
+    let syncs = |bench: &mut Bench, age_us, count| {
         for _ in 0..count {
             bench.sample.sync_age = Some(Duration::from_micros(age_us));
             bench.tick();

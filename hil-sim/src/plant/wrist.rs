@@ -188,6 +188,7 @@ impl Wrist {
             bridge_fault: [false; 3],
             over_current: self.power.tripped(),
             sync_age: None,
+            chain_in: true,
             emergency_stop: false,
         })
     }

@@ -290,6 +290,9 @@ impl Robot {
         }
         let now = instant(self.now_ns);
         let mut sample: Sample = self.plant.sample(index);
+        // The head's own OUT is always high.
+        let before = index.checked_sub(1).map(|before| &self.nodes[before]);
+        sample.chain_in = before.is_none_or(|seat| seat.node.chain_out());
         let seat = &mut self.nodes[index];
         sample.sync_age = seat.link.sync_age(self.now_ns);
         let frames = seat.link.received();

@@ -48,6 +48,11 @@ pub trait Node {
         self.vertebra().map_or(0, Vertebra::tick_trim_ns)
     }
 
+    /// Returns the level of the daisy line's OUT.
+    fn chain_out(&self) -> bool {
+        self.vertebra().is_some_and(Vertebra::chain_out)
+    }
+
     /// Starts anew.
     fn reset(&mut self, now: Instant, cause: Reset);
 

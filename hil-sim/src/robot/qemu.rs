@@ -44,6 +44,7 @@ pub struct QemuNode {
     from_image: ChildStdout,
     state: State,
     trim_ns: i32,
+    chain_out: bool,
     failure: Option<anyhow::Error>,
     /// What the image calls its pipes; gone with the node.
     _folder: TempDir,
@@ -95,6 +96,7 @@ impl QemuNode {
             from_image,
             state: State::NotReady,
             trim_ns: 0,
+            chain_out: false,
             failure: None,
             _folder: folder,
         };
@@ -175,6 +177,7 @@ impl Node for QemuNode {
                     }
                 }
                 self.trim_ns = output.trim_ns;
+                self.chain_out = output.chain_out;
                 sent.extend(output.frames);
                 output.drives
             }
@@ -201,6 +204,10 @@ impl Node for QemuNode {
 
     fn tick_trim_ns(&self) -> i32 {
         self.trim_ns
+    }
+
+    fn chain_out(&self) -> bool {
+        self.chain_out
     }
 
     /// Returns what the last pose report said.

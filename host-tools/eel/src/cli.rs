@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::active::{
-    Calibrate, Drive, Faults, Head, Lss, Nmt, Nodes, Read, Scope, SelfTest, Store, Write,
+    Calibrate, Drive, Faults, Head, Lss, Map, Nmt, Nodes, Read, Scope, SelfTest, Store, Write,
 };
 use crate::export::Format;
 use crate::filter::{Filter, Ids, Name, Node};
@@ -35,6 +35,7 @@ Examples:
   eel write 3 gains.peak_torque=2.5           in N.m, range-checked
   eel faults 3                                what stopped vertebra 3, and how it was
   eel scope 3 pose.yaw motor.angle1           every millisecond for half a second, plotted
+  eel map                                     in which order vertebrae are connected
   eel calibrate 3 --yes                       zeros, offsets and senses of vertebra 3, step by step
   eel self-test 3 --yes                       its sensors and bridges
   eel drive 3 pose --yaw 10 --degrees         vertebra 3 by hand
@@ -71,6 +72,7 @@ pub enum Command {
     Write(Write),
     Nmt(Nmt),
     Lss(Lss),
+    Map(Map),
     Store(Store),
     Calibrate(Calibrate),
     SelfTest(SelfTest),
@@ -94,6 +96,7 @@ const GROUPS: [(&str, &[&str]); 3] = [
             "scope",
             "nmt",
             "lss",
+            "map",
             "store",
             "calibrate",
             "self-test",

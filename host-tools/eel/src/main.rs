@@ -65,6 +65,7 @@ fn main() -> ExitCode {
         Command::Write(write) => write.run(),
         Command::Nmt(nmt) => nmt.run(),
         Command::Lss(lss) => lss.run(),
+        Command::Map(map) => map.run(),
         Command::Store(store) => store.run(),
         Command::Calibrate(calibrate) => calibrate.run(),
         Command::SelfTest(test) => test.run(),

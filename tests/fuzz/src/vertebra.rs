@@ -52,6 +52,7 @@ impl Bench {
                 bridge_fault: [false; 3],
                 over_current: [false; 3],
                 sync_age: None,
+                chain_in: true,
                 emergency_stop: false,
             },
             now,

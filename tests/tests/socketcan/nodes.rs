@@ -26,6 +26,11 @@ impl Nodes {
         Self::power(interface, Vec::new(), places, 1, None)
     }
 
+    /// Powers some up that have no ids yet and are connected in this order.
+    pub fn connected(interface: &str, order: Vec<NodeId>) -> Self {
+        Self::power(interface, Vec::new(), order, 1, None)
+    }
+
     /// Powers one up that was never calibrated.
     pub fn uncalibrated(interface: &str, id: NodeId, seed: u64) -> Self {
         Self::power(interface, vec![id], Vec::new(), seed, Some(id))
@@ -44,6 +49,9 @@ impl Nodes {
         let thread = thread::spawn(move || {
             let plant = Config::default();
             let mut nodes = Realtime::with_unconfigured(bus, &plant, seed, &chosen, &unconfigured);
+            if !unconfigured.is_empty() {
+                nodes.wire(&unconfigured);
+            }
             if let Some(id) = uncalibrated {
                 nodes.uncalibrate(id, seed);
             }

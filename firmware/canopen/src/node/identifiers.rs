@@ -10,6 +10,12 @@ use crate::{NmtState, lss};
 pub type Identifiers = Vec<u16, { 6 + PDOS }>;
 
 impl Node {
+    /// Tells whether a search for nodes without an id (LSS fastscan, "identify non-configured") is for this
+    /// one: an application may know its place by a line beside the bus. It is, unless told otherwise.
+    pub const fn take_part_in_search(&mut self, is_next: bool) {
+        self.lss.set_next(is_next);
+    }
+
     /// Returns the identifiers that the node listens to, for a controller's filters. They change with the
     /// parameters of the communication area, the state of LSS, and at a reset.
     pub fn identifiers(&self) -> Identifiers {

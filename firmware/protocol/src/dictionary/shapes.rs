@@ -259,3 +259,7 @@ pub(super) const TICK_TRIM: Shape = Shape {
     max: 5_000,
     ..NANOSECONDS
 };
+pub(super) const CHAIN_OUT: Shape = Shape {
+    max: 2,
+    ..byte(RW, NO)
+};

@@ -232,6 +232,12 @@ records! {
         5 ProcedureChecks "checks" word(RO, NO), "Checks of the self test that were made, a bit each.";
         6 ProcedureFailed "failed" word(RO, NO), "Checks of the self test that failed.";
     }
+    CHAIN = 0x2070 "chain", "The line from vertebra to vertebra beside the bus, which tells their order." {
+        1 ChainIn "in" byte(RO, TX),
+            "1 while IN is high: the vertebra before has a node id, or nothing is connected.";
+        2 ChainOut "out" CHAIN_OUT,
+            "What OUT does: 0 high once this vertebra has a node id, 1 low, 2 high; 0 after every reset.";
+    }
     RECORD = 0x2100 "record", "What was recorded; read as a domain, in the layouts of docs/vertebra.md." {
         1 RecordFreeze "freeze" DOMAIN,
             "Freeze frame: everything at the moment of the last fault or stop.";
@@ -281,8 +287,9 @@ pub(super) const fn position(index: u16) -> Option<usize> {
         0x2040 => 12,
         0x2050 => 13,
         0x2060 => 14,
-        0x2100 => 15,
-        0x2101 => 16,
+        0x2070 => 15,
+        0x2100 => 16,
+        0x2101 => 17,
         _ => return None,
     })
 }

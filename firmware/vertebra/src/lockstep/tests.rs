@@ -30,13 +30,13 @@ fn input() -> impl Strategy<Value = Input> {
     type Three = [i32; 3];
     let numbers = any::<(Three, [Option<i32>; 3], Three, i32, i32, Three)>();
     let others = (
-        any::<([bool; 3], [bool; 3], bool, Option<u32>)>(),
+        any::<([bool; 3], [bool; 3], bool, bool, Option<u32>)>(),
         frames(),
         0..=MAX_FRAMES as u8,
     );
     (any::<u64>(), numbers, others).prop_map(
         |(now, (counts, angles, currents, supply, board, motors), others)| {
-            let ((faults, tripped, stop, age), frames, room) = others;
+            let ((faults, tripped, stop, chain_in, age), frames, room) = others;
             let sample = Sample {
                 encoder_counts: counts,
                 absolute: angles.map(|angle| angle.map(Angle::from_q29)),
@@ -46,6 +46,7 @@ fn input() -> impl Strategy<Value = Input> {
                 motor_temperature: motors.map(Temperature::from_decidegrees),
                 bridge_fault: faults,
                 over_current: tripped,
+                chain_in,
                 sync_age: age.map(|age| Duration::from_micros(age >> 1)),
                 emergency_stop: stop,
             };
@@ -92,9 +93,9 @@ proptest! {
 
     #[test]
     fn an_output_survives_the_way_there_and_back(
-        drives in [drive(), drive(), drive()], trim_ns in any::<i32>(), frames in frames()
+        drives in [drive(), drive(), drive()], trim_ns in any::<i32>(), chain_out in any::<bool>(), frames in frames()
     ) {
-        let output = Output { drives, trim_ns, frames };
+        let output = Output { drives, trim_ns, chain_out, frames };
         let packet = output.encode();
         prop_assert_eq!(Output::decode(open(&packet, Kind::Output)), Ok(output));
     }
@@ -164,6 +165,7 @@ fn the_longest_packet_has_room() {
     let output = Output {
         drives: [Drive::Brake; 3],
         trim_ns: i32::MIN,
+        chain_out: true,
         frames,
     };
     let packet = output.encode();

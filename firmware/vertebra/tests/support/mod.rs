@@ -420,6 +420,7 @@ pub fn healthy() -> Sample {
         bridge_fault: [false; 3],
         over_current: [false; 3],
         sync_age: None,
+        chain_in: true,
         emergency_stop: false,
     }
 }

@@ -21,9 +21,10 @@ const TAKEN: Duration = Duration::from_millis(600);
 
 const AFTER: &str = "\
 A new vertebra has no node id and is silent. scan lists such nodes by their identity (about 5 s each,
-as every bit of it is asked for); assign gives them ids, one after another in the order found (by rising
-identity) or by serial number. An id lasts until power is off unless it is stored (--store, or later
-`eel lss store`).
+as every bit of it is asked for); assign gives them ids, one after another in the order found, or by
+serial number. Where the line beside the bus is connected, only the first vertebra without an id answers,
+and the order found is that from head to tail (`eel map`); else it is that of rising identity. An id lasts
+until power is off unless it is stored (--store, or later `eel lss store`).
 
 --json: scan, inquire: an array of objects: vendor, product, revision, serial, and node where there is
 one (numbers). assign: the same, with node, stored and booted (bool).
