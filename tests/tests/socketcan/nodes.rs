@@ -18,43 +18,42 @@ pub struct Nodes {
 impl Nodes {
     /// Powers some up that have their ids.
     pub fn start(interface: &str, chosen: Vec<NodeId>) -> Self {
-        Self::power(interface, chosen, Vec::new(), 1, None)
+        Self::power(interface, chosen, Vec::new(), |_| ())
     }
 
     /// Powers some up that have no ids yet.
     pub fn unconfigured(interface: &str, places: Vec<NodeId>) -> Self {
-        Self::power(interface, Vec::new(), places, 1, None)
+        Self::power(interface, Vec::new(), places, |_| ())
     }
 
     /// Powers some up that have no ids yet and are connected in this order.
     pub fn connected(interface: &str, order: Vec<NodeId>) -> Self {
-        Self::power(interface, Vec::new(), order, 1, None)
+        let places = order.clone();
+        Self::power(interface, Vec::new(), places, move |nodes| {
+            nodes.wire(&order);
+        })
     }
 
     /// Powers one up that was never calibrated.
     pub fn uncalibrated(interface: &str, id: NodeId, seed: u64) -> Self {
-        Self::power(interface, vec![id], Vec::new(), seed, Some(id))
+        Self::power(interface, vec![id], Vec::new(), move |nodes| {
+            nodes.uncalibrate(id, seed);
+        })
     }
 
     fn power(
         interface: &str,
         chosen: Vec<NodeId>,
         unconfigured: Vec<NodeId>,
-        seed: u64,
-        uncalibrated: Option<NodeId>,
+        prepare: impl FnOnce(&mut Realtime<SocketBus>) + Send + 'static,
     ) -> Self {
         let bus = SocketBus::open(interface).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&stop);
         let thread = thread::spawn(move || {
             let plant = Config::default();
-            let mut nodes = Realtime::with_unconfigured(bus, &plant, seed, &chosen, &unconfigured);
-            if !unconfigured.is_empty() {
-                nodes.wire(&unconfigured);
-            }
-            if let Some(id) = uncalibrated {
-                nodes.uncalibrate(id, seed);
-            }
+            let mut nodes = Realtime::with_unconfigured(bus, &plant, 1, &chosen, &unconfigured);
+            prepare(&mut nodes);
             nodes.run(|_| !told.load(Ordering::Relaxed)).unwrap()
         });
         Self {
