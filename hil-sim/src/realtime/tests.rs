@@ -150,7 +150,8 @@ fn give_id(
     let mut answers = Vec::new();
     for request in requests {
         send(bus, Cob::LssRequest, &request);
-        let seen = ticks(nodes, bus, 3).into_iter();
+        // What is stored is made in four ticks.
+        let seen = ticks(nodes, bus, 8).into_iter();
         answers.extend(
             seen.filter(|frame| frame.cob_id() == Some(Cob::LssResponse.id()))
                 .map(|frame| <[u8; 8]>::try_from(frame.data()).unwrap()),

@@ -84,6 +84,11 @@ pub const STM32G474: Plan = Plan {
             from: "board_stm32g474::bus::drop_waiting",
             to: WAKERS,
         },
+        // Its channels and its timer are inlined.
+        Indirect {
+            from: "board_stm32g474::control::__run_task",
+            to: WAKERS,
+        },
         Indirect {
             from: "__cortex_m_rt_main",
             to: WAKERS,
