@@ -125,13 +125,13 @@ impl Extreme {
             of("torque of a motor", "N·m", bridge, |robot, id| {
                 largest(robot.plant().motor_torque(id.index()))
             }),
-            of("yaw while driven", "rad", yaw, |robot, id| {
+            of("yaw, driven for 0.3 s", "rad", yaw, |robot, id| {
                 robot.plant().joint_pose(id.index())[0]
             }),
-            of("pitch while driven", "rad", pitch, |robot, id| {
+            of("pitch, driven for 0.3 s", "rad", pitch, |robot, id| {
                 robot.plant().joint_pose(id.index())[1]
             }),
-            of("roll while driven", "rad", roll, |robot, id| {
+            of("roll, driven for 0.3 s", "rad", roll, |robot, id| {
                 robot.plant().joint_pose(id.index())[2]
             }),
             of("rate of an angle", "rad/s", rate, |robot, id| {
