@@ -72,12 +72,6 @@ impl Defects {
         self.present.push(defect);
     }
 
-    /// Ends all of them.
-    pub fn clear(&mut self) {
-        self.present.clear();
-        self.before = None;
-    }
-
     /// Returns what bridges do that are told `drives`.
     pub fn driven(&self, mut drives: [Drive; 3]) -> [Drive; 3] {
         for defect in &self.present {

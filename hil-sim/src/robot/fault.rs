@@ -32,8 +32,6 @@ pub enum FaultKind {
     NodeHung(NodeId),
     /// Something breaks in a vertebra.
     Broken(NodeId, Defect),
-    /// All that broke in a vertebra is mended.
-    Mended(NodeId),
     /// The battery has this voltage without load from now on, mV; below 6 V no vertebra runs.
     Battery(u32),
 }

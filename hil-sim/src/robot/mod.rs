@@ -31,7 +31,6 @@ pub use fault::{Fault, FaultKind};
 pub use link::{Link, SENDING};
 pub use node::{NativeNode, Node, Reset, Turn, prototype};
 pub use qemu::QemuNode;
-pub use supervisor::{BROWN_OUT_V, STALL_NS, WATCHDOG_NS};
 
 use clock::{Happening, Schedule};
 use fault::Muffle;

@@ -12,12 +12,12 @@ use super::node::Reset;
 use super::{Robot, instant};
 
 /// Time without a control tick after which the converter's interrupt switches the bridges off.
-pub const STALL_NS: u64 = 5_000_000;
+const STALL_NS: u64 = 5_000_000;
 /// Time after which a watchdog that is not fed starts the chip anew: it is fed at most 10 ms after
 /// the last sign of life, and ends 40 ms later.
-pub const WATCHDOG_NS: u64 = 50_000_000;
+const WATCHDOG_NS: u64 = 50_000_000;
 /// Voltage of the supply below which the board's converter for 3.3 V ends, and the chip with it, V.
-pub const BROWN_OUT_V: f64 = 6.0;
+const BROWN_OUT_V: f64 = 6.0;
 /// Voltage from which on it starts again, V.
 const RECOVERY_V: f64 = 7.0;
 /// NMT "stop remote node" (CiA 301, 7.2.8.3.1.1).
@@ -108,7 +108,6 @@ impl Robot {
             FaultKind::Broken(node, defect) => {
                 self.plant.defects_mut(node.index()).add(defect);
             }
-            FaultKind::Mended(node) => self.plant.defects_mut(node.index()).clear(),
             FaultKind::Battery(millivolts) => {
                 self.plant.set_battery(f64::from(millivolts) / 1e3);
             }
