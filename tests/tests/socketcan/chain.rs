@@ -24,6 +24,9 @@ fn new_vertebrae_get_their_ids_from_head_to_tail_and_the_map_shows_it() {
         assert_eq!(row["serial"], serial, "{map}");
     }
     assert_eq!(map["ordered"], true);
+    let head = ["head", "--nodes", "1-3", "--seconds", "1"];
+    let (code, out, err) = eel(&interface, &head);
+    assert_eq!((code, &err[..]), (0, ""), "{out}");
 
     // Two that changed places are found out.
     for (from, to) in [("1", "9"), ("2", "1"), ("9", "2")] {
@@ -36,4 +39,12 @@ fn new_vertebrae_get_their_ids_from_head_to_tail_and_the_map_shows_it() {
     assert_eq!(code, 1, "{out} {err}");
     assert_eq!(out.matches("not its place").count(), 2, "{out}");
     assert!(out.contains("eel lss assign PLACE --from NODE"), "{out}");
+
+    // The head leads no such spine.
+    let (code, out, err) = eel(&interface, &head);
+    assert_eq!(code, 2, "{out} {err}");
+    assert!(
+        err.contains("vertebra 1 is the next behind vertebra 2"),
+        "{err}"
+    );
 }

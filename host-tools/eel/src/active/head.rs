@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use eel_client::Client;
+use eel_client::{Client, ClientError};
 use eel_head::{Config, Gait, GaitError, Plane};
 use eel_protocol::{HEAD_NODE, NodeId};
 
 use super::bus::{self, AnyBus, BusOption, Consent};
 use super::live::{Live, Outcome};
+use super::map;
 use crate::source;
 use crate::usage::Usage;
 
@@ -22,7 +23,8 @@ Starts the vertebrae on the bus, leads each from where it is into the gait, and 
 after --seconds, at Ctrl-C or SIGTERM, or when its terminal or the reader of its output goes away, the gait
 fades out, the eel straightens, drives are switched off and the nodes leave operation. A second Ctrl-C ends
 it at once: NMT stop to all, and vertebrae that move let go. Where the head itself dies, vertebrae let go
-within 0.1 s. Vertebrae may be boards, simulated, or both.
+within 0.1 s. Vertebrae may be boards, simulated, or both. Where the line beside the bus (see eel map) says
+that node ids don't rise from head to tail, the head does not start.
 
 Needs --yes except on a virtual interface. Only one head may be on a bus.
 
@@ -135,7 +137,7 @@ impl Head {
             None => self.bus.name()?,
         };
         self.consent.check(&name, "the head")?;
-        let bus = alone(bus::open(&name)?, &name)?;
+        let bus = in_order(alone(bus::open(&name)?, &name)?)?;
         let config = Config {
             sync_period: eel_units::Duration::from_micros(1_000_000 / self.sync_hz),
             expected: self.nodes,
@@ -215,6 +217,25 @@ pub(super) fn alone(bus: AnyBus, name: &str) -> Result<AnyBus> {
             "another head (node {HEAD_NODE}) is on {name}: stop it first, two would fight"
         ))
         .into());
+    }
+    Ok(client.into_bus())
+}
+
+/// Makes sure that the ids rise from head to tail, as far as the line beside the bus tells.
+fn in_order(bus: AnyBus) -> Result<AnyBus> {
+    let mut client = Client::new(bus);
+    match map::find_fall(&mut client) {
+        Ok(None) => {}
+        Ok(Some((node, next))) => {
+            return Err(Usage(format!(
+                "vertebra {next} is the next behind vertebra {node}, and would bend where another \
+                 should: `eel map` shows the order and how to mend it"
+            ))
+            .into());
+        }
+        Err(error @ ClientError::Bus(_)) => return Err(error.into()),
+        // A vertebra of another make, or one that is silent, which the head tells of.
+        Err(error) => eprintln!("eel: the order of the spine is not checked: {error}"),
     }
     Ok(client.into_bus())
 }

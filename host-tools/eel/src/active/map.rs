@@ -30,7 +30,7 @@ high once a vertebra has a node id, and a vertebra without one takes part in a s
 high: so `eel lss assign 1 2 3 4 5 6 7 8 9 10 --store` numbers a new spine from head to tail by itself.
 
 map checks that: it lowers every OUT, raises one after the other, and looks whose IN follows. It moves
-nothing and may be used before every start.
+nothing. `eel head` does the same before each start, and refuses to lead a spine whose ids fall somewhere.
 
 --json: one object: chain (array of {place, node, serial (numbers)}, from head to tail), ordered (boolean:
 node ids rise without a gap), unreached (array of node ids whose IN nobody raised).
@@ -53,6 +53,15 @@ pub struct Map {
     json: bool,
 }
 
+/// What raising one OUT after the other showed.
+#[derive(Debug)]
+struct Levels {
+    /// Whose IN is high while every OUT is low.
+    first: Vec<u8>,
+    /// Whose IN each one's OUT raises.
+    raised: Vec<(u8, Vec<u8>)>,
+}
+
 /// What the line tells.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Order {
@@ -63,12 +72,12 @@ struct Order {
 }
 
 impl Order {
-    /// Follows the line from the vertebrae whose IN is high while every OUT is low; `raised` says whose IN
-    /// each one's OUT raises.
-    fn new(nodes: &[u8], first: &[u8], raised: &[(u8, Vec<u8>)]) -> Self {
+    /// Follows the line from the vertebra whose IN is high while every OUT is low.
+    fn new(nodes: &[u8], levels: &Levels) -> Self {
+        let Levels { first, raised } = levels;
         let mut chain = Vec::new();
-        let mut next = match first {
-            [one] => Some(*one),
+        let mut next = match first[..] {
+            [one] => Some(one),
             _ => None,
         };
         let mut seen = BTreeSet::new();
@@ -105,12 +114,7 @@ impl Map {
             eprintln!("eel: no vertebra is heard: those without an id get one by `eel lss assign`");
             return Ok(1);
         }
-        let order = look(&mut client, &nodes);
-        // Whatever happened, each line is left to its vertebra.
-        for node in &nodes {
-            let _ = set(&mut client, *node, AUTO);
-        }
-        let order = order?;
+        let order = Order::new(&nodes, &look(&mut client, &nodes)?);
         let mut rows = Vec::new();
         for (place, node) in order.chain.iter().enumerate() {
             let serial = client.identify(*node)?.address.serial;
@@ -161,8 +165,36 @@ impl Map {
     }
 }
 
-/// Lowers every OUT and raises one after the other.
-fn look(client: &mut Client<AnyBus>, nodes: &[u8]) -> Result<Order, ClientError> {
+/// Looks whether ids rise along the line, as far as there is one, and returns the first two that don't, the
+/// one towards the head first. An open IN is high whatever happens, and tells nothing.
+pub(super) fn find_fall(client: &mut Client<AnyBus>) -> Result<Option<(u8, u8)>, ClientError> {
+    let found = client.find_nodes(1..=VERTEBRAE, HEARD)?;
+    let heard = found.iter().map(|found| found.node);
+    let nodes: Vec<u8> = heard.filter(|node| *node <= VERTEBRAE).collect();
+    Ok(look(client, &nodes)?.fall())
+}
+
+impl Levels {
+    /// Returns the first two that follow one another although their ids don't rise.
+    fn fall(&self) -> Option<(u8, u8)> {
+        let links = self
+            .raised
+            .iter()
+            .flat_map(|(node, followers)| followers.iter().map(|follower| (*node, *follower)));
+        links.into_iter().find(|(node, follower)| follower <= node)
+    }
+}
+
+/// Lowers every OUT, raises one after the other, and leaves each to its vertebra, whatever happens.
+fn look(client: &mut Client<AnyBus>, nodes: &[u8]) -> Result<Levels, ClientError> {
+    let levels = raise_each(client, nodes);
+    for node in nodes {
+        let _ = set(client, *node, AUTO);
+    }
+    levels
+}
+
+fn raise_each(client: &mut Client<AnyBus>, nodes: &[u8]) -> Result<Levels, ClientError> {
     for node in nodes {
         set(client, *node, LOW)?;
     }
@@ -175,7 +207,7 @@ fn look(client: &mut Client<AnyBus>, nodes: &[u8]) -> Result<Order, ClientError>
         raised.push((*node, followers.collect()));
         set(client, *node, LOW)?;
     }
-    Ok(Order::new(nodes, &first, &raised))
+    Ok(Levels { first, raised })
 }
 
 fn set(client: &mut Client<AnyBus>, node: u8, out: u8) -> Result<(), ClientError> {
@@ -198,23 +230,33 @@ fn high(client: &mut Client<AnyBus>, nodes: &[u8]) -> Result<Vec<u8>, ClientErro
 mod tests {
     use super::*;
 
+    /// Of three vertebrae: whose IN is high by itself, and whose follows each one's OUT.
+    fn levels(first: &[u8], followers: [&[u8]; 3]) -> Levels {
+        Levels {
+            first: first.to_vec(),
+            raised: (1..).zip(followers.map(<[u8]>::to_vec)).collect(),
+        }
+    }
+
     #[test]
     fn the_line_is_followed_from_head_to_tail() {
-        let order = Order::new(&[1, 2, 3], &[1], &[(1, vec![2]), (2, vec![3]), (3, vec![])]);
+        let straight = levels(&[1], [&[2], &[3], &[]]);
+        let order = Order::new(&[1, 2, 3], &straight);
         assert_eq!(order.chain, [1, 2, 3]);
         assert!(order.is_in_order());
-        let order = Order::new(&[1, 2, 3], &[2], &[(1, vec![]), (2, vec![3]), (3, vec![1])]);
+        assert_eq!(straight.fall(), None);
+        let turned = levels(&[2], [&[], &[3], &[1]]);
+        assert_eq!(turned.fall(), Some((3, 1)));
+        let order = Order::new(&[1, 2, 3], &turned);
         assert_eq!(order.chain, [2, 3, 1]);
         assert!(order.unreached.is_empty() && !order.is_in_order());
     }
 
     #[test]
     fn a_line_that_is_cut_or_a_ring_ends_and_names_who_is_left() {
-        let order = Order::new(
-            &[1, 2, 3],
-            &[1, 3],
-            &[(1, vec![2]), (2, vec![]), (3, vec![])],
-        );
+        let cut = levels(&[1, 3], [&[2], &[], &[]]);
+        assert_eq!(cut.fall(), None);
+        let order = Order::new(&[1, 2, 3], &cut);
         assert_eq!(
             order,
             Order {
@@ -222,7 +264,9 @@ mod tests {
                 unreached: vec![1, 2, 3]
             }
         );
-        let order = Order::new(&[1, 2, 3], &[1], &[(1, vec![2]), (2, vec![1]), (3, vec![])]);
+        let ring = levels(&[1], [&[2], &[1], &[]]);
+        assert_eq!(ring.fall(), Some((2, 1)));
+        let order = Order::new(&[1, 2, 3], &ring);
         assert_eq!((order.chain, order.unreached), (vec![1, 2], vec![3]));
     }
 }
