@@ -6,8 +6,9 @@
 //! v = k ω + R i* + Kp (i* − i) + ∫ Ki (i* − i), within the supply.
 //!
 //! The feed-forward alone would settle with the winding's own L/R; Kp = ωc L makes that faster, the
-//! integral takes up what resistance and back-EMF really are. What the supply can't give is taken back
-//! from the integral (back-calculation), so nothing winds up.
+//! integral takes up what resistance and back-EMF really are. What it would gather of a step of i* while
+//! the winding follows is taken from it in advance, so a step doesn't overshoot; what the supply can't
+//! give is taken back (back-calculation), so nothing winds up.
 
 use eel_units::{AngularVelocity, Current, Duty, Torque, Voltage, multiply_high, saturate};
 
@@ -32,11 +33,15 @@ const UNITS: i32 = 16;
 const PER_MILLIOHM: u64 = 68_719;
 /// ωc in 1/s, times 1000: 2π · 500 Hz.
 const BANDWIDTH_MILLI: u64 = 3_141_593;
-/// Ki Δt as a share of the resistance, in 10⁻⁶: ωc Δt / 4. The integral is slower than the winding by
-/// a factor of four, so that a step of i* overshoots little.
+/// Ki Δt as a share of the resistance, in 10⁻⁶: ωc Δt / 4, slower than the winding by a factor of four.
 const INTEGRAL_SHARE: u64 = 39_270;
 /// Ki Δt / Kp = Δt R / 4 L, in 10⁻³ for R/L in mΩ/µH: 12.5.
 const RETURN_MILLI: u64 = 12_500;
+
+/// Δt R/L in 10⁻³ for R/L in mΩ/µH: 50.
+const DECAY_MILLI: u64 = 50;
+/// Periods in 10⁻³ that the conversion's delay adds, and half of one for the sum of a sampled decay.
+const DELAY_MILLI: u64 = 1_500;
 
 /// A motor's constants, prepared for the control tick.
 #[derive(Clone, Copy, Debug)]
@@ -130,6 +135,8 @@ struct LoopGains {
     resistance: i32,
     proportional: i32,
     integral: i32,
+    /// What the integral gathers of a step of i* until the winding has followed.
+    rise: i32,
     back: i32,
 }
 
@@ -159,12 +166,17 @@ impl CurrentLoop {
     pub const fn new(motor: &Motor) -> Self {
         let resistance = within(motor.resistance, RESISTANCES) as u64;
         let inductance = within(motor.inductance, INDUCTANCES) as u64;
+        let integral = resistance * INTEGRAL_SHARE * PER_MILLIOHM / 1_000_000;
+        // A step's error falls as e^(−t (R/L + ωc)); this is its sum in periods.
+        let decay_milli = resistance * DECAY_MILLI / inductance + BANDWIDTH_MILLI / 20_000;
+        let periods_milli = 1_000_000 / decay_milli + DELAY_MILLI;
         Self {
             gains: LoopGains {
                 resistance: at_most(resistance * PER_MILLIOHM),
                 // µH / s is mΩ / 1000; the bandwidth has its own thousand.
                 proportional: at_most(inductance * BANDWIDTH_MILLI / 1_000_000 * PER_MILLIOHM),
-                integral: at_most(resistance * INTEGRAL_SHARE * PER_MILLIOHM / 1_000_000),
+                integral: at_most(integral),
+                rise: at_most(integral * periods_milli / 1_000),
                 back: at_most(((resistance * RETURN_MILLI) << 32) / inductance / 1_000_000),
             },
             channels: [Channel::OFF; 3],
@@ -190,12 +202,21 @@ impl CurrentLoop {
             match drive {
                 Drive::Current(_) if channel.tripped => {}
                 Drive::Current(Setpoint { current, emf }) => {
-                    channel.drive = *drive;
                     let drop = multiply_high(current.to_microamps(), self.gains.resistance);
                     let feed = emf
                         .to_millivolts()
                         .saturating_mul(UNITS)
                         .saturating_add(drop);
+                    let before = match channel.drive {
+                        Drive::Current(before) => before.current,
+                        Drive::Off | Drive::Brake => Current::ZERO,
+                    };
+                    // What the integral gathers while the current follows would be overshoot.
+                    let step = (*current - before).to_microamps();
+                    channel.integral = channel
+                        .integral
+                        .saturating_sub(multiply_high(step, self.gains.rise));
+                    channel.drive = *drive;
                     // What the supply can't give is not for the integral to take back.
                     channel.feed = feed.min(self.supply).max(-self.supply);
                 }
