@@ -141,6 +141,9 @@ catalogue! {
     NOT_FOLLOWING = 0xFF23 "not-following" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER,
         "error in 0.1 mrad",
         "The wrist was far from its target for long: it is stuck, miswired, or the gait is too fast.";
+    NEAR_SINGULARITY = 0xFF24 "near-singularity" Warning REGISTER_GENERIC | REGISTER_MANUFACTURER,
+        "det A in 0.001",
+        "The wrist is near a singularity and its torque is reduced: reduce the gait or the ranges.";
     RESIDUAL = 0xFF30 "residual" Fault REGISTER_GENERIC | REGISTER_MANUFACTURER,
         "residual in 0.1 mrad",
         "The motors' angles belong to no pose of the home branch: check couplings and calibration.";
@@ -288,6 +291,7 @@ mod tests {
             (0xFF21, "out-of-reach"),
             (0xFF22, "singular"),
             (0xFF23, "not-following"),
+            (0xFF24, "near-singularity"),
             (0xFF30, "residual"),
             (0xFF40, "restarted"),
         ];

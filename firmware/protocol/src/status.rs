@@ -40,11 +40,13 @@ pub enum Condition {
     Calibration = 16,
     /// Refuses enabling: a current sensor reads a current while the bridges are off.
     CurrentOffset = 17,
+    /// The wrist is near a singularity; torque is reduced.
+    NearSingularity = 18,
 }
 
 impl Condition {
     /// Every condition, from bit 0.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Settings,
         Self::Encoders,
         Self::Pose,
@@ -63,9 +65,10 @@ impl Condition {
         Self::FollowingError,
         Self::Calibration,
         Self::CurrentOffset,
+        Self::NearSingularity,
     ];
 
-    /// Returns the number of its bit, 0–17.
+    /// Returns the number of its bit, 0–18.
     pub const fn bit(self) -> u8 {
         self as u8
     }
@@ -74,7 +77,11 @@ impl Condition {
     pub const fn refuses(self) -> bool {
         !matches!(
             self,
-            Self::TargetLimited | Self::MomentLimited | Self::CommandLate | Self::FollowingError
+            Self::TargetLimited
+                | Self::MomentLimited
+                | Self::CommandLate
+                | Self::FollowingError
+                | Self::NearSingularity
         )
     }
 
@@ -99,6 +106,7 @@ impl Condition {
             Self::FollowingError => "following-error",
             Self::Calibration => "calibration",
             Self::CurrentOffset => "current-offset",
+            Self::NearSingularity => "near-singularity",
         }
     }
 
@@ -123,6 +131,7 @@ impl Condition {
             Self::FollowingError => "The pose is far from the target.",
             Self::Calibration => "The calibration is not this unit's: `eel calibrate`.",
             Self::CurrentOffset => "A current sensor reads a current while the bridges are off.",
+            Self::NearSingularity => "The wrist is near a singularity; torque is reduced.",
         }
     }
 }
@@ -131,7 +140,8 @@ impl Condition {
 const WARNINGS: u32 = 1 << Condition::TargetLimited.bit()
     | 1 << Condition::MomentLimited.bit()
     | 1 << Condition::CommandLate.bit()
-    | 1 << Condition::FollowingError.bit();
+    | 1 << Condition::FollowingError.bit()
+    | 1 << Condition::NearSingularity.bit();
 
 /// The status word: a set of conditions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

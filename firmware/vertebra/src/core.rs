@@ -29,10 +29,11 @@ use crate::thermal::Thermal;
 use crate::workspace::{Guide, Limited};
 
 /// Conditions that are told as warnings while they hold.
-const WARNINGS: [Condition; 3] = [
+const WARNINGS: [Condition; 4] = [
     Condition::TargetLimited,
     Condition::CommandLate,
     Condition::FollowingError,
+    Condition::NearSingularity,
 ];
 
 /// Everything of a vertebra but its node.
@@ -66,6 +67,8 @@ pub(crate) struct Core {
     /// Whether the motors' angles are those of a pose, which is measured then.
     pub has_pose: bool,
     pub pose: Pose,
+    /// det A there, 1 at home and 0 at a parallel singularity, Q30.
+    pub det_a: i32,
     pub target: ReceivedTarget,
     /// The identifier of a target that waits for SYNC.
     pub arrived: Option<u16>,
@@ -144,6 +147,7 @@ impl Core {
             hold: Pose::default(),
             has_pose: false,
             pose: Pose::default(),
+            det_a: 1 << 30,
             target: ReceivedTarget::default(),
             arrived: None,
             feed_forward: FeedForward::NEUTRAL,
@@ -275,6 +279,8 @@ impl Core {
                 Ok(motion) => {
                     let motion = found.insert(motion);
                     self.pose = motion.direct.rotation.to_pose();
+                    self.det_a = motion.direct.jacobian.det_a();
+                    self.watch_singularity();
                     if self.spare() != Spare::Nothing {
                         self.find_residual();
                     }

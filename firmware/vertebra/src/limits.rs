@@ -10,6 +10,12 @@ use crate::settings::{Limits, Ramp, Travel};
 
 /// Length of the ramp at the end of a motor's travel: 50 mrad, as a shift from Q29.
 const TRAVEL_RAMP: Angle = Angle::from_milliradians(50);
+/// det A below which torque ramps down, and at which it is a fault: 0.60 and 0.45 of home's, Q30. In the
+/// workspace of the paper it is 0.68 and more.
+pub const SINGULARITY: Ramp<i32> = Ramp {
+    start: 644_245_094,
+    end: 483_183_821,
+};
 /// One in Q15.
 const ONE: i64 = 1 << 15;
 /// Share of the peak torque that what is hot still may brake with, Q15: a quarter.
@@ -138,6 +144,8 @@ pub struct Situation<'a> {
     pub speeds: [AngularVelocity; 3],
     /// What the mode or the stop ramp allows; `None` for no cap.
     pub command_cap: Option<Torque>,
+    /// det A, Q30.
+    pub det_a: i32,
 }
 
 /// Returns what each motor may produce.
@@ -145,6 +153,12 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
     let supply = now.sample.supply;
     let low = falling(limits.supply_low.end, limits.supply_low.start, supply);
     let high = ONE - falling(limits.supply_high.start, limits.supply_high.end, supply);
+    let apart = (now.det_a < SINGULARITY.start).then(|| {
+        scaled(
+            limits.peak_torque,
+            fraction(SINGULARITY.end, SINGULARITY.start, now.det_a),
+        )
+    });
     core::array::from_fn(|index| {
         let standing = now.standing.get(index).unwrap_or(&Standing::NONE);
         let speed = now.speeds.get(index).copied().unwrap_or_default();
@@ -154,6 +168,9 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
         }
         if let Some(cap) = now.command_cap {
             bounds.cap_both(cap.abs(), LimitCode::Command);
+        }
+        if let Some(cap) = apart {
+            bounds.cap_both(cap, LimitCode::Singularity);
         }
         // A supply that is too low is drawn from by what drives; one too high is fed by what brakes.
         if low < ONE {

@@ -10,6 +10,7 @@ use crate::core::Core;
 use crate::current::hard_limit;
 use crate::encoder::Encoder;
 use crate::io::{Drive, Sample};
+use crate::limits::SINGULARITY;
 use crate::machine::STOP_DAMPED;
 use crate::thermal::Thermal;
 use crate::workspace::is_believable;
@@ -26,6 +27,8 @@ const FOLLOWING_LIMIT: Angle = Angle::from_milliradians(150);
 const FOLLOWING_END: Angle = Angle::from_milliradians(100);
 /// Deviation from the reference that no wrist has which still follows: 350 mrad.
 const LOST_LIMIT: Angle = Angle::from_milliradians(350);
+/// det A from which that warning ends, Q30: 0.61.
+const SINGULARITY_END: i32 = 654_982_512;
 /// Ticks for which the deviation may be that large.
 const LOST_TICKS: u8 = 250;
 
@@ -178,6 +181,27 @@ impl Core {
         if wrong && self.machine.is_live() {
             let detail = residual.to_tenth_milliradians().unsigned_abs();
             self.pending.fault(Emergency::RESIDUAL, None, detail);
+        }
+    }
+
+    /// Warns near a parallel singularity, where little torque of the motors is left over the moment, and
+    /// faults nearer to it.
+    pub fn watch_singularity(&mut self) {
+        let is_live = self.machine.is_live();
+        let was_near = self.status.contains(Condition::NearSingularity);
+        let limit = if was_near {
+            SINGULARITY_END
+        } else {
+            SINGULARITY.start
+        };
+        let is_near = is_live && self.det_a < limit;
+        if is_near && !was_near {
+            let detail = (i64::from(self.det_a.max(0)) * 1_000) >> 30;
+            self.emit(Emergency::NEAR_SINGULARITY, Source::whole(detail as u16));
+        }
+        self.status = self.status.with(Condition::NearSingularity, is_near);
+        if is_live && self.det_a < SINGULARITY.end {
+            self.pending.fault(Emergency::SINGULAR, None, 0);
         }
     }
 

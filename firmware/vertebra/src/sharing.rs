@@ -43,6 +43,7 @@ impl Core {
             angles: self.angles(),
             speeds: self.speeds(),
             command_cap,
+            det_a: self.det_a,
         };
         bounds(&self.settings.limits, &self.electrical, &situation)
     }

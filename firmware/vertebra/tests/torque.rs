@@ -2,7 +2,8 @@
 //! and the limit code tells which bound acted.
 
 use eel_kinematics::{Joints, Wrist};
-use eel_protocol::{LimitCode, Mode, State};
+use eel_protocol::emergency::Emergency;
+use eel_protocol::{Condition, LimitCode, Mode, State};
 use eel_units::{Current, Temperature, Voltage};
 use eel_vertebra::{Drive, Limits, Motor};
 
@@ -283,6 +284,52 @@ fn the_end_of_travel_takes_the_torque_that_leads_out_and_names_itself() {
         back.0.abs() > 2.9 && back.1[..2].contains(&LimitCode::Peak),
         "{back:?}"
     );
+}
+
+#[test]
+fn near_a_singularity_torque_falls_with_a_warning_and_nearer_it_is_a_fault() {
+    let mut settings = eel_vertebra::Settings::prototype(support::node(), 1);
+    for travel in &mut settings.limits.travel {
+        travel.low = eel_units::Angle::from_milliradians(-1_500);
+        travel.high = eel_units::Angle::from_milliradians(1_500);
+    }
+    let mut bench = Bench::with(settings);
+    bench.nmt(eel_canopen::NmtCommand::Start);
+    bench.run(400);
+    bench.mode = Mode::Moment;
+    bench.run(50);
+    assert_eq!(bench.state(), State::Moment);
+    bench.follows = false;
+    // On this way det A falls from 1 to 0.36; the kernel answers all along it.
+    let way = |share: i32| pose(-646 * share / 100, 454 * share / 100, 471 * share / 100);
+    let det_a = |bench: &Bench| {
+        let Joints(angles) = Wrist::PAPER.inverse(&bench.pose).unwrap().joints;
+        let direct = Wrist::PAPER.direct(&Joints(angles)).unwrap();
+        f64::from(direct.jacobian.det_a()) / f64::from(1 << 30)
+    };
+    let from = bench.millis;
+    let (mut share, mut limited) = (30, 0);
+    bench.move_to(way(share), 300);
+    while det_a(&bench) >= 0.47 {
+        let left = ((det_a(&bench) - 0.45) / 0.15).min(1.0);
+        for motor in bench.drives.map(|drive| torque(drive).unwrap()) {
+            assert!(motor.abs() <= 3.0 * left + 0.01, "{motor} N·m of {left}");
+        }
+        let near = det_a(&bench) < 0.60;
+        assert_eq!(bench.holds(Condition::NearSingularity), near, "{left}");
+        limited += usize::from(limits(&bench).contains(&LimitCode::Singularity));
+        share += 1;
+        bench.move_to(way(share), 20);
+    }
+    assert!(limited > 3, "torque was limited in {limited} places");
+    bench.move_to(way(60), 200);
+    assert!(!bench.holds(Condition::NearSingularity));
+    let [near, cleared] = [Emergency::NEAR_SINGULARITY, Emergency::CLEARED].map(|it| it.code);
+    assert_eq!(bench.emergencies(from), [near, cleared]);
+    let from = bench.millis;
+    bench.move_to(way(99), 600);
+    assert_eq!(bench.emergencies(from), [near, Emergency::SINGULAR.code]);
+    assert_eq!(bench.state(), State::Fault);
 }
 
 #[test]
