@@ -41,7 +41,7 @@ const SECOND_START: usize = 6_800;
 /// Most instructions that half of the turns may take in which the motors are driven.
 const MEDIAN_BUDGET: u64 = 6_000;
 /// Most instructions of any turn of this script.
-const WORST_BUDGET: u64 = 9_200;
+const WORST_BUDGET: u64 = 9_000;
 /// Most instructions of a turn in which the motors are driven.
 const DRIVEN_BUDGET: u64 = 9_000;
 /// Longest time that QEMU may take.

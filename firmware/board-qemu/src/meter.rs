@@ -9,9 +9,9 @@ use crate::stopwatch::Stopwatch;
 const INSTRUCTIONS: u64 = 1_000;
 const TICKS: u64 = 168;
 /// Instructions that count as the same where the median is looked for.
-const GRAIN: u64 = 64;
+const GRAIN: u64 = 16;
 /// Grains that are told apart; longer turns count as the last.
-const GRAINS: usize = 256;
+const GRAINS: usize = 1024;
 
 /// Counts the instructions of turns.
 pub struct Meter {
@@ -32,7 +32,7 @@ pub struct Reading {
     pub turns: u64,
     /// Instructions of a turn, mean.
     pub mean: u64,
-    /// Instructions that half of the turns in which the motors are driven don't exceed, rounded up to the grain of 64.
+    /// Instructions that half of the turns in which the motors are driven don't exceed, rounded up to the grain of 16.
     pub median: u64,
     /// Instructions of the longest turn in which the motors are driven.
     pub worst_driven: u64,

@@ -78,6 +78,10 @@ fn start(p: Peripherals, cause: failure::Start) -> Storage {
         settings.serial
     );
 
+    // What only wakes a task waits for the current loop, which has 4.
+    interrupt::FDCAN1_IT0.set_priority(Priority::P5);
+    interrupt::FDCAN1_IT1.set_priority(Priority::P5);
+    interrupt::TIM5.set_priority(Priority::P5);
     interrupt::UART4.set_priority(Priority::P5);
     interrupt::UART5.set_priority(Priority::P6);
     interrupt::LPUART1.set_priority(Priority::P7);

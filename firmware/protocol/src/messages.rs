@@ -152,15 +152,6 @@ impl Signal {
             (high >> right) as i64
         })
     }
-
-    /// Returns the least and the greatest raw number that its bits can hold.
-    pub const fn range(&self) -> (i64, i64) {
-        if self.signed {
-            (-(1 << (self.bits - 1)), (1 << (self.bits - 1)) - 1)
-        } else {
-            (0, (1 << self.bits) - 1)
-        }
-    }
 }
 
 impl Message {

@@ -36,6 +36,9 @@ const WARNINGS: [Condition; 4] = [
     Condition::NearSingularity,
 ];
 
+/// Frames in a tick that leave no time for anything else in it.
+const MANY_FRAMES: u8 = 4;
+
 /// Everything of a vertebra but its node.
 #[derive(Clone, Debug)]
 pub(crate) struct Core {
@@ -79,8 +82,11 @@ pub(crate) struct Core {
     pub status: Status,
     pub limited: Limited,
     pub guide: Guide,
-    /// Whether a pose was admitted since the last tick, or in this one.
-    pub has_followed: bool,
+    /// Frames that were heard since the last tick.
+    pub heard: u8,
+    /// Whether there is much to do besides: a pose was admitted since the last tick or in this one, or many
+    /// frames were heard, though not for a second tick in a row.
+    pub is_busy: bool,
     /// Whether the last tick was long because of one.
     pub was_long: bool,
     pub warned: bool,
@@ -156,7 +162,8 @@ impl Core {
             status: Status::NONE,
             limited: Limited::default(),
             guide: Guide::default(),
-            has_followed: false,
+            heard: 0,
+            is_busy: false,
             was_long: false,
             warned: false,
             lost_ticks: 0,
@@ -217,6 +224,8 @@ impl Core {
             // What the sensor of an open bridge reads is no current.
             thermal.take(if is_open { Current::ZERO } else { current });
         }
+        self.is_busy |= self.heard >= MANY_FRAMES && !self.was_long;
+        self.heard = 0;
         self.take_turn();
         let motion = self.estimate();
         self.watch();
@@ -239,8 +248,8 @@ impl Core {
         self.forget_warnings();
         self.report();
         self.end_warnings();
-        self.was_long = self.has_followed;
-        self.has_followed = false;
+        self.was_long = self.is_busy;
+        self.is_busy = false;
         drives
     }
 
@@ -336,10 +345,11 @@ impl Core {
 
     /// Tells the bus once that no warning holds any more.
     fn end_warnings(&mut self) {
-        let holds = WARNINGS
-            .iter()
-            .any(|condition| self.status.contains(*condition));
-        if self.warned && !holds && !self.machine.state().is_latched() {
+        let holds = |core: &Self| {
+            let mut warnings = WARNINGS.iter();
+            warnings.any(|condition| core.status.contains(*condition))
+        };
+        if self.warned && !holds(self) && !self.machine.state().is_latched() {
             self.emit(Emergency::CLEARED, Source::WHOLE);
         }
     }

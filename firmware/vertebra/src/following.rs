@@ -80,7 +80,7 @@ impl Core {
         let previous = self.spline.newest();
         let Settings { limits, wrist, .. } = &self.settings;
         let (pose, limited) = self.guide.admit(wanted, previous, period, limits, wrist);
-        self.has_followed = true;
+        self.is_busy = true;
         self.spline.push(pose);
         limited
     }

@@ -153,13 +153,7 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
     let supply = now.sample.supply;
     let low = falling(limits.supply_low.end, limits.supply_low.start, supply);
     let high = ONE - falling(limits.supply_high.start, limits.supply_high.end, supply);
-    let apart = (now.det_a < SINGULARITY.start).then(|| {
-        scaled(
-            limits.peak_torque,
-            fraction(SINGULARITY.end, SINGULARITY.start, now.det_a),
-        )
-    });
-    core::array::from_fn(|index| {
+    let mut all = core::array::from_fn(|index| {
         let standing = now.standing.get(index).unwrap_or(&Standing::NONE);
         let speed = now.speeds.get(index).copied().unwrap_or_default();
         let mut bounds = MotorBounds::symmetric(standing.braking, standing.code);
@@ -168,9 +162,6 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
         }
         if let Some(cap) = now.command_cap {
             bounds.cap_both(cap.abs(), LimitCode::Command);
-        }
-        if let Some(cap) = apart {
-            bounds.cap_both(cap, LimitCode::Singularity);
         }
         // A supply that is too low is drawn from by what drives; one too high is fed by what brakes.
         if low < ONE {
@@ -189,7 +180,14 @@ pub fn bounds(limits: &Limits, motor: &Electrical, now: &Situation<'_>) -> [Moto
             cap_travel(&mut bounds, travel, angle, limits.peak_torque);
         }
         bounds
-    })
+    });
+    if now.det_a < SINGULARITY.start {
+        let left = fraction(SINGULARITY.end, SINGULARITY.start, now.det_a);
+        for bounds in &mut all {
+            bounds.cap_both(scaled(limits.peak_torque, left), LimitCode::Singularity);
+        }
+    }
+    all
 }
 
 /// Returns how far a motor that turns at `speed` brakes with positive torque, Q15: whole from 0.25 rad/s

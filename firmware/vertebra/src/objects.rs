@@ -146,6 +146,12 @@ impl Core {
             | Field::Reversed => self.settings.value(field).unwrap_or_default(),
             Field::Architecture => PARALLEL_ACTUATORS,
             Field::GeometryScale => PROTOTYPE_SCALE_UM,
+            Field::TorqueConstant => i64::from(self.settings.motor.torque_constant),
+            Field::Resistance => i64::from(self.settings.motor.resistance),
+            Field::Inductance => i64::from(self.settings.motor.inductance),
+            Field::CurrentLimit => {
+                i64::from(self.settings.motor.current_limit.to_microamps() / 1_000)
+            }
             Field::Supply => self.measured(|sample| sample.supply.to_millivolts()),
             Field::BoardTemperature => self.measured(|sample| tenths(sample.board_temperature)),
             Field::MotorTemperature1 => self.measured(|sample| tenths(sample.motor_temperature[0])),

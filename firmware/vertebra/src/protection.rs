@@ -186,9 +186,13 @@ impl Core {
 
     /// Warns near a parallel singularity, where little torque of the motors is left over the moment, and
     /// faults nearer to it.
+    #[inline]
     pub fn watch_singularity(&mut self) {
-        let is_live = self.machine.is_live();
         let was_near = self.status.contains(Condition::NearSingularity);
+        if self.det_a >= SINGULARITY_END && !was_near {
+            return;
+        }
+        let is_live = self.machine.is_live();
         let limit = if was_near {
             SINGULARITY_END
         } else {

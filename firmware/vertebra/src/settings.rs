@@ -378,9 +378,9 @@ impl Motor {
     /// A 24 V brushed motor of the 26 mm class: 34.6 mN·m/A, 5.8 Ω, 0.55 mH, gear 43:1, 2048 counts a
     /// turn of its shaft.
     pub const PROTOTYPE: Self = Self {
-        torque_constant: 1_488_000,
-        resistance: 5_800,
-        inductance: 550,
+        torque_constant: factory(Field::TorqueConstant) as u32,
+        resistance: factory(Field::Resistance) as u32,
+        inductance: factory(Field::Inductance) as u32,
         friction: Friction {
             coulomb: Torque::from_millinewton_metres(factory(Field::FrictionCoulomb) as i32),
             viscous: factory(Field::FrictionViscous) as u32,
@@ -397,7 +397,7 @@ impl Motor {
             ambient: Temperature::from_decidegrees(factory(Field::Ambient) as i32),
         },
         counts_per_turn: 88_064,
-        current_limit: Current::from_milliamps(2_500),
+        current_limit: Current::from_milliamps(factory(Field::CurrentLimit) as i32),
         speed_limit: AngularVelocity::from_milliradians_per_second(40_000),
     };
 }

@@ -11,7 +11,7 @@ const ROUND: u8 = 32;
 /// What a tick has time for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spare {
-    /// Nothing: a target makes it long already.
+    /// Nothing: a target or many frames make it long already.
     Nothing,
     /// The temperature of a motor, 0-2.
     Temperature(usize),
@@ -28,7 +28,7 @@ pub enum Spare {
 impl Core {
     /// Returns what this tick has time for.
     pub const fn spare(&self) -> Spare {
-        if self.has_followed {
+        if self.is_busy {
             return Spare::Nothing;
         }
         match self.turn {
@@ -42,7 +42,7 @@ impl Core {
 
     /// Begins a tick: it is the next one's turn, and the temperatures are brought up to date.
     pub fn take_turn(&mut self) {
-        if !self.has_followed {
+        if !self.is_busy {
             self.turn = (self.turn + 1) % ROUND;
         }
         if let Spare::Temperature(motor) = self.spare() {

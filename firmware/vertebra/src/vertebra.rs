@@ -118,6 +118,7 @@ impl Vertebra {
     /// Takes a frame from the bus.
     pub fn handle_frame(&mut self, now: Instant, frame: &Frame) {
         self.core.now = now;
+        self.core.heard = self.core.heard.saturating_add(1);
         if frame.cob_id() == Some(Cob::Nmt.id()) {
             self.hasten_store();
         }

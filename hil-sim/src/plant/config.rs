@@ -236,7 +236,7 @@ impl Default for Water {
 }
 
 impl Default for Motor {
-    /// A 24 V motor of 25 mm with a 43:1 gear; the thermal figures are of the size that catalogues
+    /// A 24 V motor of the 26 mm class with a 43:1 gear; the thermal figures are of the size that catalogues
     /// give for such motors (winding about 12 s, housing about 10 min).
     fn default() -> Self {
         Self {

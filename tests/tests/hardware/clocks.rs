@@ -79,8 +79,8 @@ fn the_priorities_are_those_that_the_code_sets() {
     }
     assert_eq!(
         set.len(),
-        4,
-        "the board sets other priorities than four: change this test"
+        7,
+        "the board sets other priorities than seven: change this test"
     );
     let page = text(PAGE);
     let mut found = Vec::new();

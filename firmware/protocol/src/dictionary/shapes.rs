@@ -142,6 +142,16 @@ pub(super) const SCALE: Shape = Shape {
     max: 40_000,
     ..raw(DataType::U32, CONST, NO)
 };
+pub(super) const fn motor(unit: &'static str, digits: u32, value: i64) -> Shape {
+    Shape {
+        unit,
+        scale: scale(1, 10_u32.pow(digits)),
+        default: value,
+        min: value,
+        max: value,
+        ..raw(DataType::U32, CONST, NO)
+    }
+}
 pub(super) const SUPPLY: Shape = thousandths(DataType::U16, RO, TX, "V");
 pub(super) const TEMPERATURE: Shape = Shape {
     unit: "degC",

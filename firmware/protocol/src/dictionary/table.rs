@@ -197,6 +197,14 @@ records! {
         11 WindingTemperature2 "winding2_temperature" TEMPERATURE, "Temperature of motor 2's winding, by a model.";
         12 WindingTemperature3 "winding3_temperature" TEMPERATURE, "Temperature of motor 3's winding, by a model.";
     }
+    MOTOR_CONSTANTS = 0x2031 "motor_constants", "What the current loop's gains follow from, seen from a crank." {
+        1 TorqueConstant "torque_constant" motor("N.m/A", 6, 1_488_000),
+            "Torque of a crank per current; as much is its back-EMF per speed, in V.s/rad.";
+        2 Resistance "resistance" motor("Ohm", 3, 5_800), "Resistance of a winding and its bridge.";
+        3 Inductance "inductance" motor("H", 6, 550), "Inductance of a winding.";
+        4 CurrentLimit "current_limit" motor("A", 3, 2_500),
+            "Most current that a bridge is told; it is switched off at half as much again.";
+    }
     TIMING = 0x2040 "timing", "The control loop's time and the beat of the bus." {
         1 LoopLast "loop_last" MICROSECONDS, "Time that the last control tick took.";
         2 LoopMax "loop_max" MICROSECONDS, "Longest time that a control tick took since power-up.";
@@ -284,12 +292,13 @@ pub(super) const fn position(index: u16) -> Option<usize> {
         0x2022 => 9,
         0x2023 => 10,
         0x2030 => 11,
-        0x2040 => 12,
-        0x2050 => 13,
-        0x2060 => 14,
-        0x2070 => 15,
-        0x2100 => 16,
-        0x2101 => 17,
+        0x2031 => 12,
+        0x2040 => 13,
+        0x2050 => 14,
+        0x2060 => 15,
+        0x2070 => 16,
+        0x2100 => 17,
+        0x2101 => 18,
         _ => return None,
     })
 }
