@@ -47,7 +47,7 @@ fn the_same_seed_gives_the_same_bits_in_every_profile() {
         assert_eq!(plant.sample(joint), again.sample(joint));
     }
     // Pinned: debug and release, and every machine, must come to this. It changes with the model.
-    assert_eq!(plant.fingerprint(), 0x0b1a_cc0b_8ad4_2bfc);
+    assert_eq!(plant.fingerprint(), 0x1c9a_7bb0_fdef_c479);
 }
 
 #[test]

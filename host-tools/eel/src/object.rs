@@ -279,7 +279,7 @@ mod tests {
             find("poze")
                 .unwrap_err()
                 .0
-                .contains("moment, motor, motor_settings, motor_torque, pose")
+                .contains("moment, motor, motor_constants, motor_settings, motor_torque, pose")
         );
         assert!(find("0x1G").is_err() && find("0x1018:256").is_err());
     }
