@@ -12,6 +12,8 @@ mod faults;
 mod friction;
 #[path = "system/reactions.rs"]
 mod reactions;
+#[path = "system/stops.rs"]
+mod stops;
 #[path = "system/swim.rs"]
 mod swim;
 #[path = "system/watch.rs"]
