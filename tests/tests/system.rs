@@ -1,5 +1,7 @@
 //! The whole robot in simulated time: it swims, and it lets go when it must.
 
+#[path = "system/bus_off.rs"]
+mod bus_off;
 #[path = "system/client.rs"]
 mod client;
 #[path = "system/defects.rs"]

@@ -56,6 +56,7 @@ const IMPORTS: &[(&str, &[&str])] = &[
         "hil-sim",
         &[
             "eel-vertebra",
+            "eel-drivers",
             "eel-head",
             "eel-kinematics",
             "eel-protocol",

@@ -23,8 +23,8 @@
 //!   frames are one frame with two senders, as on a real bus.
 //! - A frame that nobody acknowledges ends in an error frame and is sent again.
 //!
-//! Deliberately absent here: the receive error counter, suspended transmission, bus-off and
-//! recovery, random bit errors, oscillator drift and cable faults.
+//! Deliberately absent here: the receive error counter, suspended transmission, bus-off by count (the
+//! robot's faults take a controller off), random bit errors, oscillator drift and cable faults.
 
 mod arbitration;
 mod controller;

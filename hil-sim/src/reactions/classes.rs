@@ -66,6 +66,14 @@ const LOST: &[(Reaction, u64)] = &[
     (Reaction::Free, 2_500_000),
 ];
 
+/// The same for a vertebra that is cut off: the first missing target is due up to a period after that (µs).
+const CUT_OFF: &[(Reaction, u64)] = &[
+    (Reaction::Slowing, 40_000),
+    (Reaction::Latched, 110_000),
+    (Reaction::Undriven, 510_000),
+    (Reaction::Free, 2_510_000),
+];
+
 /// Picks a motor.
 fn motor(random: &mut Random) -> usize {
     (random.bits() % 3) as usize
@@ -203,6 +211,14 @@ pub const CLASSES: &[Class] = &[
         is_timed_by_targets: true,
         make: |_, node| FaultKind::TargetsLost(node),
         expects: LOST,
+    },
+    Class {
+        name: "bus-off",
+        what: "the CAN controller goes bus-off",
+        is_common: false,
+        is_timed_by_targets: false,
+        make: |_, node| FaultKind::BusOff(node),
+        expects: CUT_OFF,
     },
     Class {
         name: "targets-bent",

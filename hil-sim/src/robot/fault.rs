@@ -30,6 +30,8 @@ pub enum FaultKind {
     NodeReset(NodeId),
     /// A vertebra's program hangs, until its watchdog starts it anew.
     NodeHung(NodeId),
+    /// A vertebra's controller leaves the bus after too many errors, and rejoins after its board's pause.
+    BusOff(NodeId),
     /// Something breaks in a vertebra.
     Broken(NodeId, Defect),
     /// The battery has this voltage without load from now on, mV; below 6 V no vertebra runs.

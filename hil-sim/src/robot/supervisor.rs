@@ -1,9 +1,11 @@
 //! What watches over a vertebra's program on its board, and what goes wrong.
 //!
 //! The board's converter switches the bridges off when the control tick stays away, its watchdog then
-//! starts the chip anew, and the brown-out reset holds the chip while its supply is too low. None of that
+//! starts the chip anew, and the brown-out reset holds the chip while its supply is too low; a
+//! controller that is bus-off rejoins after the pause of the board's own [`Backoff`]. None of that
 //! is the program's own, so a node of the simulator has it here.
 
+use eel_drivers::Backoff;
 use eel_protocol::{Cob, Frame};
 use eel_vertebra::Drive;
 
@@ -30,13 +32,19 @@ pub(super) struct Supervisor {
     hung_ns: Option<u64>,
     /// Whether the supply is too low for the chip.
     is_dark: bool,
+    /// Until when the controller stays off the bus.
+    away_ns: Option<u64>,
+    backoff: Backoff,
 }
 
 impl Robot {
     /// Tells whether a vertebra's program runs now, after what its board did otherwise.
     pub(super) fn may_turn(&mut self, index: usize) -> bool {
         let supply_v = self.plant.supply_v();
-        let Supervisor { hung_ns, is_dark } = self.nodes[index].supervisor;
+        self.rejoin(index);
+        let Supervisor {
+            hung_ns, is_dark, ..
+        } = self.nodes[index].supervisor;
         if is_dark {
             if supply_v < RECOVERY_V {
                 return false;
@@ -45,6 +53,7 @@ impl Robot {
         } else if supply_v < BROWN_OUT_V {
             let seat = &mut self.nodes[index];
             seat.supervisor.is_dark = true;
+            seat.supervisor.away_ns = None;
             seat.drives = [Drive::Off; 3];
             seat.link.power(&mut self.bus, self.now_ns, false);
             return false;
@@ -59,6 +68,19 @@ impl Robot {
             self.restart(index, Reset::Failure);
         }
         true
+    }
+
+    /// Puts a controller that was bus-off on the bus again when its pause is over.
+    fn rejoin(&mut self, index: usize) {
+        let seat = &mut self.nodes[index];
+        if seat
+            .supervisor
+            .away_ns
+            .is_some_and(|until| until <= self.now_ns)
+        {
+            seat.supervisor.away_ns = None;
+            seat.link.power(&mut self.bus, self.now_ns, true);
+        }
     }
 
     /// Starts a vertebra's chip anew.
@@ -104,6 +126,15 @@ impl Robot {
             FaultKind::NodeHung(node) => {
                 let supervisor = &mut self.nodes[node.index()].supervisor;
                 supervisor.hung_ns = supervisor.hung_ns.or(Some(self.now_ns));
+            }
+            FaultKind::BusOff(node) => {
+                let seat = &mut self.nodes[node.index()];
+                if !seat.supervisor.is_dark {
+                    let pause = seat.supervisor.backoff.pause(instant(self.now_ns));
+                    let pause_ns = u64::from(pause.to_micros()) * 1_000;
+                    seat.supervisor.away_ns = Some(self.now_ns + pause_ns);
+                    seat.link.power(&mut self.bus, self.now_ns, false);
+                }
             }
             FaultKind::Broken(node, defect) => {
                 self.plant.defects_mut(node.index()).add(defect);
