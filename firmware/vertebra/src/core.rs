@@ -87,7 +87,7 @@ pub(crate) struct Core {
     /// Whether there is much to do besides: a pose was admitted since the last tick or in this one, or many
     /// frames were heard, though not for a second tick in a row.
     pub is_busy: bool,
-    /// Whether the last tick was long because of one.
+    /// Whether the last tick was busy.
     pub was_long: bool,
     pub warned: bool,
     pub lost_ticks: u8,
