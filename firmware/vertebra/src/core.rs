@@ -457,7 +457,7 @@ impl Core {
             target_limited: holds(Condition::TargetLimited),
             moment_limited,
             command_lost: holds(Condition::CommandLost) || holds(Condition::CommandLate),
-            warning: holds(Condition::FollowingError),
+            warning: holds(Condition::FollowingError) || holds(Condition::NearSingularity),
         };
     }
 

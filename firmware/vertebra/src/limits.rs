@@ -11,7 +11,7 @@ use crate::settings::{Limits, Ramp, Travel};
 /// Length of the ramp at the end of a motor's travel: 50 mrad, as a shift from Q29.
 const TRAVEL_RAMP: Angle = Angle::from_milliradians(50);
 /// det A below which torque ramps down, and at which it is a fault: 0.60 and 0.45 of home's, Q30. In the
-/// workspace of the paper it is 0.68 and more.
+/// workspace of the paper it is 0.67 and more.
 pub const SINGULARITY: Ramp<i32> = Ramp {
     start: 644_245_094,
     end: 483_183_821,

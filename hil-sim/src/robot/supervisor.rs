@@ -129,7 +129,7 @@ impl Robot {
             }
             FaultKind::BusOff(node) => {
                 let seat = &mut self.nodes[node.index()];
-                if !seat.supervisor.is_dark {
+                if !seat.supervisor.is_dark && seat.supervisor.away_ns.is_none() {
                     let pause = seat.supervisor.backoff.pause(instant(self.now_ns));
                     let pause_ns = u64::from(pause.to_micros()) * 1_000;
                     seat.supervisor.away_ns = Some(self.now_ns + pause_ns);

@@ -137,6 +137,7 @@ impl Head {
             None => self.bus.name()?,
         };
         self.consent.check(&name, "the head")?;
+        source::catch_interrupt()?;
         let bus = in_order(alone(bus::open(&name)?, &name)?)?;
         let config = Config {
             sync_period: eel_units::Duration::from_micros(1_000_000 / self.sync_hz),
@@ -146,7 +147,6 @@ impl Head {
         let mut live = Live::new(bus, config, self.json);
         live.resets_first = self.reset;
         let limit = self.seconds.map(Duration::from_secs_f64);
-        source::catch_interrupt()?;
         let outcome = live.run(limit)?;
         self.tell(&outcome)?;
         Ok(u64::from(!outcome.is_fine()))

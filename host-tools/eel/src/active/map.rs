@@ -171,7 +171,12 @@ pub(super) fn find_fall(client: &mut Client<AnyBus>) -> Result<Option<(u8, u8)>,
     let found = client.find_nodes(1..=VERTEBRAE, HEARD)?;
     let heard = found.iter().map(|found| found.node);
     let nodes: Vec<u8> = heard.filter(|node| *node <= VERTEBRAE).collect();
-    Ok(look(client, &nodes)?.fall())
+    let fall = look(client, &nodes)?.fall();
+    // A vertebra that starts meanwhile raises its OUT by itself: what is no fall twice is none.
+    match fall {
+        Some(_) if look(client, &nodes)?.fall() != fall => Ok(None),
+        _ => Ok(fall),
+    }
 }
 
 impl Levels {
