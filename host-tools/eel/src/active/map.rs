@@ -106,10 +106,7 @@ impl Map {
     /// Looks, and returns 1 where the order is not that of the ids.
     pub fn run(&self) -> Result<u64> {
         let mut client = self.bus.client()?;
-        let found = client.find_nodes(1..=VERTEBRAE, HEARD)?;
-        let nodes: Vec<u8> = (found.iter().map(|found| found.node))
-            .filter(|node| *node <= VERTEBRAE)
-            .collect();
+        let nodes = find_vertebrae(&mut client)?;
         if nodes.is_empty() {
             eprintln!("eel: no vertebra is heard: those without an id get one by `eel lss assign`");
             return Ok(1);
@@ -168,9 +165,7 @@ impl Map {
 /// Looks whether ids rise along the line, as far as there is one, and returns the first two that don't, the
 /// one towards the head first. An open IN is high whatever happens, and tells nothing.
 pub(super) fn find_fall(client: &mut Client<AnyBus>) -> Result<Option<(u8, u8)>, ClientError> {
-    let found = client.find_nodes(1..=VERTEBRAE, HEARD)?;
-    let heard = found.iter().map(|found| found.node);
-    let nodes: Vec<u8> = heard.filter(|node| *node <= VERTEBRAE).collect();
+    let nodes = find_vertebrae(client)?;
     let fall = look(client, &nodes)?.fall();
     // A vertebra that starts meanwhile raises its OUT by itself: what is no fall twice is none.
     match fall {
@@ -179,14 +174,21 @@ pub(super) fn find_fall(client: &mut Client<AnyBus>) -> Result<Option<(u8, u8)>,
     }
 }
 
+/// Returns the ids of the vertebrae that are heard.
+fn find_vertebrae(client: &mut Client<AnyBus>) -> Result<Vec<u8>, ClientError> {
+    let found = client.find_nodes(1..=VERTEBRAE, HEARD)?;
+    let heard = found.iter().map(|found| found.node);
+    Ok(heard.filter(|node| *node <= VERTEBRAE).collect())
+}
+
 impl Levels {
     /// Returns the first two that follow one another although their ids don't rise.
     fn fall(&self) -> Option<(u8, u8)> {
-        let links = self
+        let mut links = self
             .raised
             .iter()
             .flat_map(|(node, followers)| followers.iter().map(|follower| (*node, *follower)));
-        links.into_iter().find(|(node, follower)| follower <= node)
+        links.find(|(node, follower)| follower <= node)
     }
 }
 
